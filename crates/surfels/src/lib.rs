@@ -1,3 +1,14 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! surfels
+#![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
+
+mod extract;
+mod moments;
+mod place;
+mod surfel;
+pub mod sym3;
+
+pub use extract::{Points, Settings, extract};
+pub use moments::Moments;
+pub use place::place_points;
+pub use surfel::SurfelSet;

@@ -1,3 +1,16 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! trajectory
+#![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
+
+mod correction_spline;
+mod head;
+mod imu;
+mod propagation;
+mod samples;
+pub mod so3;
+
+pub use correction_spline::{Basis, CorrectionSpline, StencilWeights};
+pub use head::{Head, Motor};
+pub use imu::{Imu, NodeForce};
+pub use propagation::{extend_constant_velocity, extend_inertial};
+pub use samples::{Pose, Trajectory, TrajectoryError};

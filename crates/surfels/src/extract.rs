@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! From points to surfels.
+
+use bentwing_trajectory::{Head, Trajectory};
+use nalgebra::Vector3;
+
+use crate::{Moments, SurfelSet, place_points, sym3};
+
+/// Bits per voxel coordinate in a packed key; enough for ±400 km at 0.4 m.
+const KEY_BITS: u32 = 21;
+const KEY_OFFSET: i64 = 1 << (KEY_BITS - 1);
+
+/// What makes a surfel.
+#[derive(Clone, Debug)]
+pub struct Settings {
+    /// Voxel size of the finest level, m; each further level doubles it.
+    pub voxel_size: f64,
+    /// Number of levels.
+    pub n_levels: usize,
+    /// A cell is split where its points pause for longer than this, s.
+    pub max_gap: f64,
+    /// A cell is split when its points span more than this, s.
+    pub max_span: f64,
+    /// Fewest points of a surfel.
+    pub min_points: u32,
+    /// Least `2 (λ2 − λ1) / (λ1 + λ2 + λ3)`.
+    pub min_planarity: f64,
+    /// Least `λ2 / λ3`.
+    pub min_width_ratio: f64,
+    /// Least `√λ2` in units of the voxel size; rejects single scan lines, whose normal is free
+    /// to turn about the line.
+    pub min_width: f64,
+}
+
+/// Time-stamped points of the lidar.
+#[derive(Clone, Copy, Debug)]
+pub struct Points<'a> {
+    /// Positions, m, lidar frame.
+    pub points: &'a [[f64; 3]],
+    /// Non-decreasing stamps, s, lidar clock.
+    pub stamps: &'a [f64],
+    /// Encoder angles, rad; empty for heads without motor.
+    pub angles: &'a [f64],
+}
+
+/// Points of one voxel seen in one go.
+struct Cell {
+    key: u64,
+    moments: Moments,
+}
+
+/// Extracts the surfels of all levels from points placed with `trajectory` (Kaul 2015, 2.1).
+pub fn extract(
+    points: Points<'_>,
+    trajectory: &Trajectory,
+    head: &Head,
+    settings: &Settings,
+) -> SurfelSet {
+    let placed =
+        place_points(points.points, points.stamps, points.angles, trajectory, head);
+    let origin = trajectory.positions()[0];
+    let mut set = SurfelSet { level_starts: vec![0], ..SurfelSet::default() };
+    let mut cells = runs(&placed, &points, &origin, settings.voxel_size);
+    for level in 0..settings.n_levels {
+        if level > 0 {
+            for cell in &mut cells {
+                cell.key = coarser(cell.key);
+            }
+        }
+        cells = merge(cells, settings);
+        let size = settings.voxel_size * f64::from(1u32 << level);
+        for cell in &cells {
+            push_surfel(&mut set, &cell.moments, &origin, size, trajectory, head, settings);
+        }
+        set.level_starts.push(set.len());
+        set.voxel_sizes.push(size);
+    }
+    set
+}
+
+/// Consecutive points in the same voxel, which a scan line has many of, become one cell at once.
+fn runs(placed: &[[f64; 3]], points: &Points<'_>, origin: &Vector3<f64>, size: f64) -> Vec<Cell> {
+    let mut cells: Vec<Cell> = Vec::with_capacity(placed.len() / 4);
+    for (i, p) in placed.iter().enumerate() {
+        let key = pack(p, size);
+        let angle = points.angles.get(i).copied().unwrap_or(0.0);
+        let local = [p[0] - origin.x, p[1] - origin.y, p[2] - origin.z];
+        let moments = Moments::of_point(local, points.stamps[i], angle);
+        match cells.last_mut() {
+            Some(last) if last.key == key => last.moments.merge(&moments),
+            _ => cells.push(Cell { key, moments }),
+        }
+    }
+    cells
+}
+
+/// Merges cells of the same voxel as long as neither a pause nor the span of time forbids it.
+fn merge(cells: Vec<Cell>, settings: &Settings) -> Vec<Cell> {
+    let mut order: Vec<(u64, u32)> = (0u32..).zip(&cells).map(|(i, c)| (c.key, i)).collect();
+    order.sort_unstable_by(|a, b| {
+        let time = |i: u32| cells[i as usize].moments.span().0;
+        a.0.cmp(&b.0).then_with(|| time(a.1).total_cmp(&time(b.1))).then(a.1.cmp(&b.1))
+    });
+    let mut merged: Vec<Cell> = Vec::with_capacity(cells.len() / 2);
+    for (key, i) in order {
+        let moments = cells[i as usize].moments;
+        match merged.last_mut() {
+            Some(last) if last.key == key && belongs(&last.moments, &moments, settings) => {
+                last.moments.merge(&moments);
+            }
+            _ => merged.push(Cell { key, moments }),
+        }
+    }
+    merged
+}
+
+fn belongs(earlier: &Moments, later: &Moments, settings: &Settings) -> bool {
+    let ((start, end), (next_start, next_end)) = (earlier.span(), later.span());
+    next_start - end <= settings.max_gap && next_end - start <= settings.max_span
+}
+
+fn push_surfel(
+    set: &mut SurfelSet,
+    moments: &Moments,
+    origin: &Vector3<f64>,
+    size: f64,
+    trajectory: &Trajectory,
+    head: &Head,
+    settings: &Settings,
+) {
+    if moments.n() < settings.min_points {
+        return;
+    }
+    let covariance = moments.covariance();
+    let eigen = sym3::eigen(&covariance);
+    let [l1, l2, l3] = eigen.values;
+    let planarity = 2.0 * (l2 - l1) / (l1 + l2 + l3);
+    let is_surface = planarity > settings.min_planarity
+        && l2 > settings.min_width_ratio * l3
+        && l2 > (settings.min_width * size).powi(2);
+    if !is_surface {
+        return;
+    }
+    let (stamp, angle) = (moments.mean_time(), moments.mean_angle());
+    let pose = trajectory.pose(stamp - head.latency);
+    let (R_imu_lidar, t_imu_lidar) = head.lidar_in_imu(angle);
+    let R_lidar_map = (pose.R * R_imu_lidar).transpose();
+    let t_map_lidar = pose.p + pose.R * t_imu_lidar;
+    let mean = R_lidar_map * (moments.mean() + origin - t_map_lidar);
+    let normal = R_lidar_map * eigen.normal;
+    set.means.push(mean);
+    set.covariances.push(R_lidar_map * covariance * R_lidar_map.transpose());
+    // Turned to the sensor: otherwise thin walls match front to back.
+    set.normals.push(if normal.dot(&mean) > 0.0 { -normal } else { normal });
+    set.stamps.push(stamp);
+    set.angles.push(angle);
+    set.n_points.push(moments.n());
+}
+
+fn pack(p: &[f64; 3], size: f64) -> u64 {
+    let mut key = 0;
+    for c in p {
+        let i = (c / size).floor() as i64 + KEY_OFFSET;
+        key = key << KEY_BITS | (i as u64 & ((1 << KEY_BITS) - 1));
+    }
+    key
+}
+
+/// Key of the voxel of twice the size that contains the voxel of `key`.
+///
+/// Half the offset is added back so that the coordinate zero keeps its place.
+fn coarser(key: u64) -> u64 {
+    let mask = (1u64 << KEY_BITS) - 1;
+    let mut coarse = 0;
+    for shift in [2 * KEY_BITS, KEY_BITS, 0] {
+        let i = ((key >> shift & mask) as i64 - KEY_OFFSET).div_euclid(2) + KEY_OFFSET;
+        coarse = coarse << KEY_BITS | (i as u64 & mask);
+    }
+    coarse
+}
+
+#[cfg(test)]
+mod tests;

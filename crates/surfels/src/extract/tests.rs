@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+use bentwing_trajectory::so3;
+use nalgebra::Isometry3;
+use proptest::prelude::*;
+
+use super::*;
+
+fn settings() -> Settings {
+    Settings {
+        voxel_size: 0.4,
+        n_levels: 4,
+        max_gap: 0.08,
+        max_span: 0.3,
+        min_points: 6,
+        min_planarity: 0.3,
+        min_width_ratio: 0.03,
+        min_width: 0.05,
+    }
+}
+
+fn head() -> Head {
+    Head {
+        T_imu_base: Isometry3::new(Vector3::new(0.03, 0.0, -0.05), Vector3::new(0.0, 0.02, 0.1)),
+        latency: 0.002,
+        motor: None,
+    }
+}
+
+fn moving() -> Trajectory {
+    let n = 121;
+    let positions = (0..n).map(|i| Vector3::new(0.005 * f64::from(i), 0.0, 1.5)).collect();
+    let rate = Vector3::new(0.05, 0.0, 3.0);
+    let rotations = (0..n).map(|i| so3::exp(&(rate * 0.01 * f64::from(i)))).collect();
+    Trajectory::new(-0.05, 0.01, positions, rotations).unwrap()
+}
+
+/// Points on the plane x = 4 m, seen by the moving head at increasing stamps.
+fn wall(trajectory: &Trajectory, head: &Head) -> (Vec<[f64; 3]>, Vec<f64>) {
+    let (R, t) = head.lidar_in_imu(0.0);
+    let mut out = (Vec::new(), Vec::new());
+    for i in 0..4000 {
+        let stamp = 0.1 + 0.00005 * f64::from(i);
+        let (column, row) = (i / 40, i % 40);
+        let target = Vector3::new(4.0, 0.05 * f64::from(column) - 2.5, 0.05 * f64::from(row));
+        let pose = trajectory.pose(stamp - head.latency);
+        let p = R.transpose() * (pose.R.transpose() * (target - pose.p) - t);
+        out.0.push(p.into());
+        out.1.push(stamp);
+    }
+    out
+}
+
+#[test]
+fn surfels_of_a_wall_lie_on_it_and_face_the_sensor() {
+    let (trajectory, head) = (moving(), head());
+    let (points, stamps) = wall(&trajectory, &head);
+    let points = Points { points: &points, stamps: &stamps, angles: &[] };
+    let set = extract(points, &trajectory, &head, &settings());
+    assert!((0..4).all(|l| !set.level(l).is_empty()));
+    for i in 0..set.len() {
+        let pose = trajectory.pose(set.stamps[i] - head.latency);
+        let (R, t) = head.lidar_in_imu(0.0);
+        let mean = pose.R * (R * set.means[i] + t) + pose.p;
+        let normal = pose.R * R * set.normals[i];
+        assert!((mean.x - 4.0).abs() < 1e-4, "mean {mean}");
+        assert!((normal + Vector3::x()).norm() < 1e-3, "normal {normal}");
+    }
+}
+
+#[test]
+fn a_single_scan_line_is_no_surfel() {
+    let (trajectory, head) = (moving(), head());
+    let line: Vec<[f64; 3]> = (0..500).map(|i| [4.0, 0.01 * f64::from(i), 0.3]).collect();
+    let stamps: Vec<f64> = (0..500).map(|i| 0.2 + 1e-6 * f64::from(i)).collect();
+    let points = Points { points: &line, stamps: &stamps, angles: &[] };
+    assert!(extract(points, &trajectory, &head, &settings()).is_empty());
+}
+
+#[test]
+fn a_pause_splits_a_cell_in_two_surfels() {
+    let still = Trajectory::new(
+        0.0,
+        1.0,
+        vec![Vector3::zeros(); 3],
+        vec![so3::exp(&Vector3::zeros()); 3],
+    )
+    .unwrap();
+    let head = Head { T_imu_base: Isometry3::identity(), latency: 0.0, motor: None };
+    let patch = |k: i32| [1.0 + 1e-3 * f64::from(k % 2), 0.02 * f64::from(k % 10) + 0.05, 0.02 * f64::from(k / 10) + 0.05];
+    let points: Vec<[f64; 3]> = (0..200).map(|k| patch(k % 100)).collect();
+    let stamps: Vec<f64> = (0..200).map(|k| 1e-4 * f64::from(k) + if k < 100 { 0.0 } else { 1.0 }).collect();
+    let set = extract(Points { points: &points, stamps: &stamps, angles: &[] }, &still, &head, &settings());
+    assert_eq!(set.level(0).len(), 2);
+}
+
+proptest! {
+    #[test]
+    fn coarse_keys_are_the_keys_of_twice_the_voxel(x in -900.0..900.0_f64, y in -900.0..900.0_f64, z in -90.0..90.0_f64) {
+        let p = [x, y, z];
+        prop_assert_eq!(coarser(pack(&p, 0.4)), pack(&p, 0.8));
+        prop_assert_eq!(coarser(coarser(pack(&p, 0.4))), pack(&p, 1.6));
+    }
+}

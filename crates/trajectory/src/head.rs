@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! The geometry of the sensor head: where the lidar is, seen from the IMU.
+
+use nalgebra::{Isometry3, Matrix3, UnitQuaternion, Vector3};
+
+use crate::so3;
+
+/// A motor that turns the lidar: `T_imu_lidar(θ) = T_imu_motor · Rot(axis, θ + zero) · T_motor_lidar`.
+#[derive(Clone, Copy, Debug)]
+pub struct Motor {
+    /// Axis of rotation, unit vector, motor frame.
+    pub axis: Vector3<f64>,
+    /// Added to every encoder angle, rad.
+    pub zero: f64,
+    /// Lidar in the rotating motor frame.
+    pub T_motor_lidar: Isometry3<f64>,
+}
+
+/// Sensor head: lidar, IMU and, where there is one, the motor between them.
+#[derive(Clone, Copy, Debug)]
+pub struct Head {
+    /// `T_imu_lidar`, or `T_imu_motor` for a motor-turned lidar.
+    pub T_imu_base: Isometry3<f64>,
+    /// Lidar stamps minus IMU clock, s: what is stamped t was measured at `t - latency`.
+    pub latency: f64,
+    /// The motor, if the lidar is turned by one.
+    pub motor: Option<Motor>,
+}
+
+impl Head {
+    /// Rotation and translation of the lidar in the IMU frame at encoder angle `theta`.
+    pub fn lidar_in_imu(&self, theta: f64) -> (Matrix3<f64>, Vector3<f64>) {
+        let base = self.T_imu_base;
+        let T = match &self.motor {
+            None => base,
+            Some(m) => base * turn(m, theta) * m.T_motor_lidar,
+        };
+        (T.rotation.to_rotation_matrix().into_inner(), T.translation.vector)
+    }
+
+    /// The point `p_lidar` in the base frame (lidar frame, or motor frame before its rotation),
+    /// together with the rotation `R_imu_base` and the rotation of the motor.
+    pub fn point_in_base(&self, p_lidar: &Vector3<f64>, theta: f64) -> Vector3<f64> {
+        match &self.motor {
+            None => *p_lidar,
+            Some(m) => (turn(m, theta) * m.T_motor_lidar).transform_point(&(*p_lidar).into()).coords,
+        }
+    }
+}
+
+fn turn(motor: &Motor, theta: f64) -> UnitQuaternion<f64> {
+    so3::exp(&(motor.axis * (theta + motor.zero)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_motor_head_follows_the_chain_of_frames() {
+        let head = Head {
+            T_imu_base: Isometry3::translation(0.0, 0.0, 1.0),
+            latency: 0.0,
+            motor: Some(Motor {
+                axis: Vector3::z(),
+                zero: 0.25,
+                T_motor_lidar: Isometry3::translation(0.1, 0.0, 0.0),
+            }),
+        };
+        let quarter = std::f64::consts::FRAC_PI_2 - 0.25;
+        let (R, t) = head.lidar_in_imu(quarter);
+        assert!((t - Vector3::new(0.0, 0.1, 1.0)).norm() < 1e-12);
+        assert!((R * Vector3::x() - Vector3::y()).norm() < 1e-12);
+        let p = head.point_in_base(&Vector3::new(1.0, 0.0, 0.0), quarter);
+        assert!((p - Vector3::new(0.0, 1.1, 0.0)).norm() < 1e-12);
+    }
+}

@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Inertial samples and what they say about the trajectory's samples.
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::{Trajectory, so3};
+
+/// Samples further apart than this, s, are a gap: nothing is said about the time between them.
+const MAX_GAP: f64 = 0.05;
+
+/// Inertial samples in time order, with the running integral of the gyro.
+#[derive(Clone, Debug)]
+pub struct Imu {
+    times: Vec<f64>,
+    gyro: Vec<Vector3<f64>>,
+    accel: Vec<Vector3<f64>>,
+    /// Cumulative trapezoid of the gyro at its own stamps, rad. Averaging the samples that fall
+    /// in an interval instead would be centred half a sample off and read as latency.
+    turned: Vec<Vector3<f64>>,
+}
+
+/// Mean specific force around one sample of the trajectory, seen from the IMU at that sample.
+#[derive(Clone, Copy, Debug)]
+pub struct NodeForce {
+    /// `Σ w_k R_nᵀ R(t_k) f_k`, m/s², biases included.
+    pub force: Vector3<f64>,
+    /// `Σ w_k R_nᵀ R(t_k)`: how a constant bias of the accelerometer enters `force`.
+    pub bias_gain: Matrix3<f64>,
+}
+
+impl Imu {
+    /// Takes samples with increasing `times`; all slices have the same length.
+    pub fn new(times: Vec<f64>, gyro: Vec<Vector3<f64>>, accel: Vec<Vector3<f64>>) -> Self {
+        let mut sum = Vector3::zeros();
+        let mut turned = Vec::with_capacity(times.len());
+        for k in 0..times.len() {
+            if k > 0 {
+                sum += (gyro[k] + gyro[k - 1]) * (0.5 * (times[k] - times[k - 1]));
+            }
+            turned.push(sum);
+        }
+        Self { times, gyro, accel, turned }
+    }
+
+    /// Number of samples.
+    pub fn len(&self) -> usize {
+        self.times.len()
+    }
+
+    /// Whether there are no samples.
+    pub fn is_empty(&self) -> bool {
+        self.times.is_empty()
+    }
+
+    /// Index of the last sample at or before `t`, if `t` lies between two samples without a gap.
+    fn bracket(&self, t: f64) -> Option<usize> {
+        let after = self.times.partition_point(|&s| s <= t);
+        if after == 0 {
+            return None;
+        }
+        if after == self.times.len() {
+            return (self.times[after - 1] == t && after > 1).then_some(after - 2);
+        }
+        (self.times[after] - self.times[after - 1] <= MAX_GAP).then_some(after - 1)
+    }
+
+    /// Integral of the gyro from the first sample to `t`, rad, imu frame.
+    fn turned_until(&self, t: f64) -> Option<Vector3<f64>> {
+        let k = self.bracket(t)?;
+        let width = self.times[k + 1] - self.times[k];
+        let s = t - self.times[k];
+        let rate = self.gyro[k] + (self.gyro[k + 1] - self.gyro[k]) * (0.5 * s / width);
+        Some(self.turned[k] + rate * s)
+    }
+
+    /// Integral of the gyro over `[from, to]`, rad, imu frame, bias included; `None` in a gap.
+    pub fn rotation_increment(&self, from: f64, to: f64) -> Option<Vector3<f64>> {
+        Some(self.turned_until(to)? - self.turned_until(from)?)
+    }
+
+    /// Triangular mean of the specific force over `±dt` around sample `n`, which is what the
+    /// second difference of the positions measures; `None` in a gap or at the ends.
+    pub fn node_force(&self, trajectory: &Trajectory, n: usize) -> Option<NodeForce> {
+        let (t, dt) = (trajectory.time(n), trajectory.dt());
+        self.bracket(t - dt)?;
+        self.bracket(t + dt)?;
+        let first = self.times.partition_point(|&s| s <= t - dt);
+        let last = self.times.partition_point(|&s| s < t + dt);
+        let mut node = NodeForce { force: Vector3::zeros(), bias_gain: Matrix3::zeros() };
+        let mut total = 0.0;
+        for k in first.max(1)..last.min(self.len() - 1) {
+            let span = self.times[k + 1] - self.times[k - 1];
+            let weight = (1.0 - (self.times[k] - t).abs() / dt) * span;
+            let R = relative_rotation(trajectory, n, self.times[k]);
+            node.force += R * self.accel[k] * weight;
+            node.bias_gain += R * weight;
+            total += weight;
+        }
+        // Fewer samples than nodes: the nearest straight line between samples stands in.
+        if total <= 0.0 {
+            return self.interpolated_force(t);
+        }
+        node.force /= total;
+        node.bias_gain /= total;
+        Some(node)
+    }
+
+    fn interpolated_force(&self, t: f64) -> Option<NodeForce> {
+        let k = self.bracket(t)?;
+        let u = (t - self.times[k]) / (self.times[k + 1] - self.times[k]);
+        let force = self.accel[k] + (self.accel[k + 1] - self.accel[k]) * u;
+        Some(NodeForce { force, bias_gain: Matrix3::identity() })
+    }
+}
+
+/// `R_nᵀ R(t)` for `t` within one interval of sample `n`.
+fn relative_rotation(trajectory: &Trajectory, n: usize, t: f64) -> Matrix3<f64> {
+    let u = (t - trajectory.time(n)) / trajectory.dt();
+    let steps = trajectory.steps();
+    let phi = if u < 0.0 { steps[n.max(1) - 1] } else { steps[n.min(steps.len() - 1)] } * u;
+    so3::exp(&phi).to_rotation_matrix().into_inner()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn uniform(rate_hz: f64, phase: f64, seconds: f64) -> Vec<f64> {
+        (0..(seconds * rate_hz) as usize).map(|k| phase + k as f64 / rate_hz).collect()
+    }
+
+    #[test]
+    fn a_linear_rate_is_integrated_exactly_at_any_phase() {
+        let times = uniform(200.0, -0.0013, 1.0);
+        let gyro = times.iter().map(|&t| Vector3::new(1.0 + 2.0 * t, 0.0, 0.0)).collect();
+        let accel = vec![Vector3::zeros(); times.len()];
+        let imu = Imu::new(times, gyro, accel);
+        let angle = imu.rotation_increment(0.1, 0.2047).unwrap().x;
+        let exact = 0.1047 + (0.2047_f64.powi(2) - 0.1_f64.powi(2));
+        assert!((angle - exact).abs() < 1e-12);
+    }
+
+    #[test]
+    fn nothing_is_said_across_a_gap_or_beyond_the_ends() {
+        let mut times = uniform(200.0, 0.0, 1.0);
+        times.retain(|&t| !(0.4..0.6).contains(&t));
+        let n = times.len();
+        let imu = Imu::new(times, vec![Vector3::z(); n], vec![Vector3::zeros(); n]);
+        assert!(imu.rotation_increment(0.1, 0.2).is_some());
+        assert!(imu.rotation_increment(0.3, 0.5).is_none());
+        assert!(imu.rotation_increment(0.9, 1.1).is_none());
+    }
+
+    #[test]
+    fn mean_force_of_a_turning_imu_under_constant_force_is_that_force() {
+        let rate = Vector3::new(0.3, -0.2, 6.0);
+        let positions = vec![Vector3::zeros(); 101];
+        let rotations: Vec<_> = (0..101).map(|n| so3::exp(&(rate * 0.01 * f64::from(n)))).collect();
+        let trajectory = Trajectory::new(0.0, 0.01, positions, rotations).unwrap();
+        let force = Vector3::new(1.0, 2.0, 9.8);
+        for rate_hz in [100.0, 200.0, 250.0, 1000.0] {
+            let times = uniform(rate_hz, -0.0021, 1.1);
+            let accel = times.iter().map(|&t| so3::exp(&(rate * t)).inverse() * force).collect();
+            let imu = Imu::new(times.clone(), vec![rate; times.len()], accel);
+            let node = imu.node_force(&trajectory, 50).unwrap();
+            assert!((trajectory.rotations()[50] * node.force - force).norm() < 1e-9);
+        }
+    }
+}

@@ -1,3 +1,29 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! registration
+#![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
+
+mod constraints;
+mod fixed_view;
+mod globals;
+mod health;
+mod matches;
+mod normal_equations;
+mod placed;
+mod robust;
+mod rows;
+mod settings;
+mod solve;
+mod window;
+
+pub use fixed_view::FixedView;
+pub use globals::{GlobalPrior, Globals, N_GLOBALS, index};
+pub use health::Health;
+pub use normal_equations::NormalEquations;
+pub use settings::{ImuNoise, Settings};
+pub use solve::{Solution, SolveError, Solver};
+pub use window::{Initial, Problem, Registration, register_window};
+
+/// A vector of all global states or their corrections.
+pub type GlobalVector = [f64; N_GLOBALS];
+/// A matrix over all global states.
+pub type GlobalMatrix = nalgebra::SMatrix<f64, N_GLOBALS, N_GLOBALS>;

@@ -56,11 +56,19 @@ pub fn extract(
     head: &Head,
     settings: &Settings,
 ) -> SurfelSet {
-    let placed =
-        place_points(points.points, points.stamps, points.angles, trajectory, head);
+    let placed = place_points(
+        points.points,
+        points.stamps,
+        points.angles,
+        trajectory,
+        head,
+    );
     let origin = trajectory.positions()[0];
-    let mut set = SurfelSet { level_starts: vec![0], ..SurfelSet::default() };
-    let mut cells = runs(&placed, &points, &origin, settings.voxel_size);
+    let mut set = SurfelSet {
+        level_starts: vec![0],
+        ..SurfelSet::default()
+    };
+    let mut cells = runs(&placed, &points, &origin, settings);
     for level in 0..settings.n_levels {
         if level > 0 {
             for cell in &mut cells {
@@ -70,7 +78,15 @@ pub fn extract(
         cells = merge(cells, settings);
         let size = settings.voxel_size * f64::from(1u32 << level);
         for cell in &cells {
-            push_surfel(&mut set, &cell.moments, &origin, size, trajectory, head, settings);
+            push_surfel(
+                &mut set,
+                &cell.moments,
+                &origin,
+                size,
+                trajectory,
+                head,
+                settings,
+            );
         }
         set.level_starts.push(set.len());
         set.voxel_sizes.push(size);
@@ -79,15 +95,22 @@ pub fn extract(
 }
 
 /// Consecutive points in the same voxel, which a scan line has many of, become one cell at once.
-fn runs(placed: &[[f64; 3]], points: &Points<'_>, origin: &Vector3<f64>, size: f64) -> Vec<Cell> {
+fn runs(
+    placed: &[[f64; 3]],
+    points: &Points<'_>,
+    origin: &Vector3<f64>,
+    settings: &Settings,
+) -> Vec<Cell> {
     let mut cells: Vec<Cell> = Vec::with_capacity(placed.len() / 4);
     for (i, p) in placed.iter().enumerate() {
-        let key = pack(p, size);
+        let key = pack(p, settings.voxel_size);
         let angle = points.angles.get(i).copied().unwrap_or(0.0);
         let local = [p[0] - origin.x, p[1] - origin.y, p[2] - origin.z];
         let moments = Moments::of_point(local, points.stamps[i], angle);
         match cells.last_mut() {
-            Some(last) if last.key == key => last.moments.merge(&moments),
+            Some(last) if last.key == key && belongs(&last.moments, &moments, settings) => {
+                last.moments.merge(&moments);
+            }
             _ => cells.push(Cell { key, moments }),
         }
     }
@@ -99,7 +122,9 @@ fn merge(cells: Vec<Cell>, settings: &Settings) -> Vec<Cell> {
     let mut order: Vec<(u64, u32)> = (0u32..).zip(&cells).map(|(i, c)| (c.key, i)).collect();
     order.sort_unstable_by(|a, b| {
         let time = |i: u32| cells[i as usize].moments.span().0;
-        a.0.cmp(&b.0).then_with(|| time(a.1).total_cmp(&time(b.1))).then(a.1.cmp(&b.1))
+        a.0.cmp(&b.0)
+            .then_with(|| time(a.1).total_cmp(&time(b.1)))
+            .then(a.1.cmp(&b.1))
     });
     let mut merged: Vec<Cell> = Vec::with_capacity(cells.len() / 2);
     for (key, i) in order {
@@ -149,9 +174,14 @@ fn push_surfel(
     let mean = R_lidar_map * (moments.mean() + origin - t_map_lidar);
     let normal = R_lidar_map * eigen.normal;
     set.means.push(mean);
-    set.covariances.push(R_lidar_map * covariance * R_lidar_map.transpose());
+    set.covariances
+        .push(R_lidar_map * covariance * R_lidar_map.transpose());
     // Turned to the sensor: otherwise thin walls match front to back.
-    set.normals.push(if normal.dot(&mean) > 0.0 { -normal } else { normal });
+    set.normals.push(if normal.dot(&mean) > 0.0 {
+        -normal
+    } else {
+        normal
+    });
     set.stamps.push(stamp);
     set.angles.push(angle);
     set.n_points.push(moments.n());

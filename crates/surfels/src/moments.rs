@@ -86,7 +86,12 @@ mod tests {
 
     #[test]
     fn merged_moments_are_those_of_all_points() {
-        let points = [[1.0, 2.0, 3.0], [2.0, 0.0, 1.0], [0.0, 1.0, -1.0], [5.0, 5.0, 5.0]];
+        let points = [
+            [1.0, 2.0, 3.0],
+            [2.0, 0.0, 1.0],
+            [0.0, 1.0, -1.0],
+            [5.0, 5.0, 5.0],
+        ];
         let mut left = Moments::of_point(points[0], 0.3, 1.0);
         left.merge(&Moments::of_point(points[1], 0.1, 2.0));
         let mut right = Moments::of_point(points[2], 0.2, 3.0);

@@ -21,12 +21,15 @@ pub fn place_points(
 ) -> Vec<[f64; 3]> {
     let placer = Placer::new(trajectory, head);
     let mut placed = vec![[0.0; 3]; points.len()];
-    placed.par_chunks_mut(CHUNK).enumerate().for_each(|(c, out)| {
-        for (i, out) in (c * CHUNK..).zip(out) {
-            let angle = angles.get(i).copied().unwrap_or(0.0);
-            *out = placer.place(&points[i], times[i], angle);
-        }
-    });
+    placed
+        .par_chunks_mut(CHUNK)
+        .enumerate()
+        .for_each(|(c, out)| {
+            for (i, out) in (c * CHUNK..).zip(out) {
+                let angle = angles.get(i).copied().unwrap_or(0.0);
+                *out = placer.place(&points[i], times[i], angle);
+            }
+        });
     placed
 }
 
@@ -41,9 +44,17 @@ struct Placer<'a> {
 impl<'a> Placer<'a> {
     fn new(trajectory: &'a Trajectory, head: &'a Head) -> Self {
         let rotations = trajectory.rotations().iter();
-        let rotations = rotations.map(|q| q.to_rotation_matrix().into_inner()).collect();
+        let rotations = rotations
+            .map(|q| q.to_rotation_matrix().into_inner())
+            .collect();
         let (R_imu_lidar, t_imu_lidar) = head.lidar_in_imu(0.0);
-        Self { trajectory, head, rotations, R_imu_lidar, t_imu_lidar }
+        Self {
+            trajectory,
+            head,
+            rotations,
+            R_imu_lidar,
+            t_imu_lidar,
+        }
     }
 
     fn in_imu(&self, p: &[f64; 3], angle: f64) -> Vector3<f64> {
@@ -52,7 +63,8 @@ impl<'a> Placer<'a> {
             None => self.R_imu_lidar * p + self.t_imu_lidar,
             Some(_) => {
                 let T: &Isometry3<f64> = &self.head.T_imu_base;
-                T.transform_point(&self.head.point_in_base(&p, angle).into()).coords
+                T.transform_point(&self.head.point_in_base(&p, angle).into())
+                    .coords
             }
         }
     }
@@ -81,8 +93,12 @@ mod tests {
     #[test]
     fn points_are_placed_by_the_interpolated_pose_and_the_chain_of_frames() {
         let rate = Vector3::new(1.0, 0.5, 8.0);
-        let positions = (0..50).map(|n| Vector3::new(0.02, 0.01, 0.0) * f64::from(n)).collect();
-        let rotations = (0..50).map(|n| so3::exp(&(rate * 0.01 * f64::from(n)))).collect();
+        let positions = (0..50)
+            .map(|n| Vector3::new(0.02, 0.01, 0.0) * f64::from(n))
+            .collect();
+        let rotations = (0..50)
+            .map(|n| so3::exp(&(rate * 0.01 * f64::from(n))))
+            .collect();
         let trajectory = Trajectory::new(0.0, 0.01, positions, rotations).unwrap();
         let motor = Motor {
             axis: Vector3::y(),
@@ -91,7 +107,11 @@ mod tests {
         };
         let base = Isometry3::new(Vector3::new(0.3, 0.0, 0.1), Vector3::z());
         for motor in [None, Some(motor)] {
-            let head = Head { T_imu_base: base, latency: 0.003, motor };
+            let head = Head {
+                T_imu_base: base,
+                latency: 0.003,
+                motor,
+            };
             let p = [3.0, 20.0, -4.0];
             let placed = place_points(&[p], &[0.2574], &[1.3], &trajectory, &head)[0];
             let (R, t) = head.lidar_in_imu(1.3);

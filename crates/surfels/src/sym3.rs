@@ -18,7 +18,10 @@ pub fn eigen(a: &Matrix3<f64>) -> Eigen {
     let b = a - Matrix3::from_diagonal_element(mean);
     let p2 = b.norm_squared() / 6.0;
     if p2 <= f64::MIN_POSITIVE {
-        return Eigen { values: [mean; 3], normal: Vector3::z() };
+        return Eigen {
+            values: [mean; 3],
+            normal: Vector3::z(),
+        };
     }
     let p = p2.sqrt();
     let half_det = (b / p).determinant() * 0.5;
@@ -26,14 +29,21 @@ pub fn eigen(a: &Matrix3<f64>) -> Eigen {
     let largest = mean + 2.0 * p * angle.cos();
     let smallest = mean + 2.0 * p * (angle + 2.0 * std::f64::consts::FRAC_PI_3).cos();
     let middle = 3.0 * mean - largest - smallest;
-    Eigen { values: [smallest, middle, largest], normal: null_vector(a, smallest) }
+    Eigen {
+        values: [smallest, middle, largest],
+        normal: null_vector(a, smallest),
+    }
 }
 
 /// Unit vector in the null space of `a − λ`: the longest cross product of two of its rows.
 fn null_vector(a: &Matrix3<f64>, lambda: f64) -> Vector3<f64> {
     let m = a - Matrix3::from_diagonal_element(lambda);
     let rows = [m.column(0), m.column(1), m.column(2)];
-    let crosses = [rows[0].cross(&rows[1]), rows[1].cross(&rows[2]), rows[2].cross(&rows[0])];
+    let crosses = [
+        rows[0].cross(&rows[1]),
+        rows[1].cross(&rows[2]),
+        rows[2].cross(&rows[0]),
+    ];
     let mut best = crosses[0];
     for c in &crosses[1..] {
         if c.norm_squared() > best.norm_squared() {
@@ -68,7 +78,11 @@ mod tests {
 
     #[test]
     fn degenerate_matrices_give_finite_answers() {
-        for m in [Matrix3::zeros(), Matrix3::identity(), Matrix3::from_element(1.0)] {
+        for m in [
+            Matrix3::zeros(),
+            Matrix3::identity(),
+            Matrix3::from_element(1.0),
+        ] {
             let e = eigen(&m);
             assert!(e.values.iter().all(|v| v.is_finite()));
             assert!((e.normal.norm() - 1.0).abs() < 1e-12);

@@ -34,8 +34,13 @@ pub struct CorrectionSpline {
 impl CorrectionSpline {
     /// The shortest spline with interval `h` that covers `[start, end]`.
     pub fn covering(start: f64, end: f64, h: f64) -> Self {
-        let intervals = (((end - start) / h).ceil() as usize).max(1);
-        Self { t0: start, h, n_controls: intervals + 3 }
+        // A stencil needs five control points.
+        let intervals = (((end - start) / h).ceil() as usize).max(2);
+        Self {
+            t0: start,
+            h,
+            n_controls: intervals + 3,
+        }
     }
 
     /// Number of control points.
@@ -68,7 +73,11 @@ impl CorrectionSpline {
     ///
     /// The times must not be further apart than one knot interval. The finite differences of the
     /// trajectory's samples are differentiated exactly this way, also across a knot.
-    pub fn stencil<const K: usize>(&self, times: [f64; K], coefficients: [f64; K]) -> StencilWeights {
+    pub fn stencil<const K: usize>(
+        &self,
+        times: [f64; K],
+        coefficients: [f64; K],
+    ) -> StencilWeights {
         let bases = times.map(|t| self.basis(t));
         let lowest = bases.iter().map(|b| b.first).min().unwrap_or(0);
         let first = lowest.min(self.n_controls.saturating_sub(5));

@@ -35,7 +35,10 @@ impl Head {
             None => base,
             Some(m) => base * turn(m, theta) * m.T_motor_lidar,
         };
-        (T.rotation.to_rotation_matrix().into_inner(), T.translation.vector)
+        (
+            T.rotation.to_rotation_matrix().into_inner(),
+            T.translation.vector,
+        )
     }
 
     /// The point `p_lidar` in the base frame (lidar frame, or motor frame before its rotation),
@@ -43,7 +46,11 @@ impl Head {
     pub fn point_in_base(&self, p_lidar: &Vector3<f64>, theta: f64) -> Vector3<f64> {
         match &self.motor {
             None => *p_lidar,
-            Some(m) => (turn(m, theta) * m.T_motor_lidar).transform_point(&(*p_lidar).into()).coords,
+            Some(m) => {
+                (turn(m, theta) * m.T_motor_lidar)
+                    .transform_point(&(*p_lidar).into())
+                    .coords
+            }
         }
     }
 }

@@ -39,7 +39,12 @@ impl Imu {
             }
             turned.push(sum);
         }
-        Self { times, gyro, accel, turned }
+        Self {
+            times,
+            gyro,
+            accel,
+            turned,
+        }
     }
 
     /// Number of samples.
@@ -86,7 +91,10 @@ impl Imu {
         self.bracket(t + dt)?;
         let first = self.times.partition_point(|&s| s <= t - dt);
         let last = self.times.partition_point(|&s| s < t + dt);
-        let mut node = NodeForce { force: Vector3::zeros(), bias_gain: Matrix3::zeros() };
+        let mut node = NodeForce {
+            force: Vector3::zeros(),
+            bias_gain: Matrix3::zeros(),
+        };
         let mut total = 0.0;
         for k in first.max(1)..last.min(self.len() - 1) {
             let span = self.times[k + 1] - self.times[k - 1];
@@ -109,7 +117,10 @@ impl Imu {
         let k = self.bracket(t)?;
         let u = (t - self.times[k]) / (self.times[k + 1] - self.times[k]);
         let force = self.accel[k] + (self.accel[k + 1] - self.accel[k]) * u;
-        Some(NodeForce { force, bias_gain: Matrix3::identity() })
+        Some(NodeForce {
+            force,
+            bias_gain: Matrix3::identity(),
+        })
     }
 }
 
@@ -117,7 +128,11 @@ impl Imu {
 fn relative_rotation(trajectory: &Trajectory, n: usize, t: f64) -> Matrix3<f64> {
     let u = (t - trajectory.time(n)) / trajectory.dt();
     let steps = trajectory.steps();
-    let phi = if u < 0.0 { steps[n.max(1) - 1] } else { steps[n.min(steps.len() - 1)] } * u;
+    let phi = if u < 0.0 {
+        steps[n.max(1) - 1]
+    } else {
+        steps[n.min(steps.len() - 1)]
+    } * u;
     so3::exp(&phi).to_rotation_matrix().into_inner()
 }
 
@@ -126,13 +141,18 @@ mod tests {
     use super::*;
 
     fn uniform(rate_hz: f64, phase: f64, seconds: f64) -> Vec<f64> {
-        (0..(seconds * rate_hz) as usize).map(|k| phase + k as f64 / rate_hz).collect()
+        (0..(seconds * rate_hz) as usize)
+            .map(|k| phase + k as f64 / rate_hz)
+            .collect()
     }
 
     #[test]
     fn a_linear_rate_is_integrated_exactly_at_any_phase() {
         let times = uniform(200.0, -0.0013, 1.0);
-        let gyro = times.iter().map(|&t| Vector3::new(1.0 + 2.0 * t, 0.0, 0.0)).collect();
+        let gyro = times
+            .iter()
+            .map(|&t| Vector3::new(1.0 + 2.0 * t, 0.0, 0.0))
+            .collect();
         let accel = vec![Vector3::zeros(); times.len()];
         let imu = Imu::new(times, gyro, accel);
         let angle = imu.rotation_increment(0.1, 0.2047).unwrap().x;
@@ -155,12 +175,17 @@ mod tests {
     fn mean_force_of_a_turning_imu_under_constant_force_is_that_force() {
         let rate = Vector3::new(0.3, -0.2, 6.0);
         let positions = vec![Vector3::zeros(); 101];
-        let rotations: Vec<_> = (0..101).map(|n| so3::exp(&(rate * 0.01 * f64::from(n)))).collect();
+        let rotations: Vec<_> = (0..101)
+            .map(|n| so3::exp(&(rate * 0.01 * f64::from(n))))
+            .collect();
         let trajectory = Trajectory::new(0.0, 0.01, positions, rotations).unwrap();
         let force = Vector3::new(1.0, 2.0, 9.8);
         for rate_hz in [100.0, 200.0, 250.0, 1000.0] {
             let times = uniform(rate_hz, -0.0021, 1.1);
-            let accel = times.iter().map(|&t| so3::exp(&(rate * t)).inverse() * force).collect();
+            let accel = times
+                .iter()
+                .map(|&t| so3::exp(&(rate * t)).inverse() * force)
+                .collect();
             let imu = Imu::new(times.clone(), vec![rate; times.len()], accel);
             let node = imu.node_force(&trajectory, 50).unwrap();
             assert!((trajectory.rotations()[50] * node.force - force).norm() < 1e-9);

@@ -24,7 +24,9 @@ pub fn extend_inertial(
     while trajectory.end() + dt <= until + 1e-9 {
         let n = trajectory.len() - 1;
         let (t, t_next) = (trajectory.time(n), trajectory.time(n + 1));
-        let turned = imu.rotation_increment(t, t_next).map(|d| d - gyro_bias * dt);
+        let turned = imu
+            .rotation_increment(t, t_next)
+            .map(|d| d - gyro_bias * dt);
         let step = turned.unwrap_or(trajectory.steps()[n - 1]);
         let R = trajectory.rotations()[n] * so3::exp(&step);
         let p = trajectory.positions()[n];
@@ -66,10 +68,15 @@ mod tests {
     #[test]
     fn noiseless_inertial_samples_reproduce_a_circular_flight() {
         let (rate, gravity) = (Vector3::new(0.1, 0.0, 6.0), Vector3::new(0.0, 0.0, 9.81));
-        let (bg, ba) = (Vector3::new(0.01, -0.02, 0.03), Vector3::new(0.1, 0.05, -0.07));
+        let (bg, ba) = (
+            Vector3::new(0.01, -0.02, 0.03),
+            Vector3::new(0.1, 0.05, -0.07),
+        );
         let times: Vec<f64> = (0..1300).map(|k| f64::from(k) * 0.005 - 0.0512).collect();
-        let accel =
-            times.iter().map(|&t| truth(t).1.inverse() * (truth(t).2 + gravity) + ba).collect();
+        let accel = times
+            .iter()
+            .map(|&t| truth(t).1.inverse() * (truth(t).2 + gravity) + ba)
+            .collect();
         let imu = Imu::new(times.clone(), vec![rate + bg; times.len()], accel);
         let (p0, p1) = (truth(0.0), truth(0.01));
         let mut trajectory =

@@ -73,7 +73,13 @@ impl Trajectory {
             return Err(TrajectoryError::Interval(dt));
         }
         let steps = steps_in_body(&rotations, Vec::new());
-        Ok(Self { t0, dt, positions, rotations, steps })
+        Ok(Self {
+            t0,
+            dt,
+            positions,
+            rotations,
+            steps,
+        })
     }
 
     /// Time of the first sample, s.
@@ -129,7 +135,10 @@ impl Trajectory {
         let (n, u) = self.locate(t);
         let p = self.positions[n] + (self.positions[n + 1] - self.positions[n]) * u;
         let R = self.rotations[n] * so3::exp(&(self.steps[n] * u));
-        Pose { p, R: R.to_rotation_matrix().into_inner() }
+        Pose {
+            p,
+            R: R.to_rotation_matrix().into_inner(),
+        }
     }
 
     /// Velocity (m/s, map frame) and angular rate (rad/s, map frame) at `t`.
@@ -161,12 +170,11 @@ impl Trajectory {
 
     /// Composes a correction into every sample: `p ← p + δt`, `R ← Exp(δr) R` (Kaul 2015, eq. 3).
     ///
-    /// `correction(t)` returns `[δr, δt]`.
-    pub fn correct(&mut self, correction: impl Fn(f64) -> [Vector3<f64>; 2]) {
-        for n in 0..self.len() {
-            let [dr, dp] = correction(self.time(n));
+    /// There is one `[δr, δt]` per sample.
+    pub fn correct(&mut self, corrections: &[[Vector3<f64>; 2]]) {
+        for (n, [dr, dp]) in corrections.iter().enumerate() {
             self.positions[n] += dp;
-            let corrected = so3::exp(&dr) * self.rotations[n];
+            let corrected = so3::exp(dr) * self.rotations[n];
             self.rotations[n] = UnitQuaternion::new_normalize(corrected.into_inner());
         }
         self.steps = steps_in_body(&self.rotations, std::mem::take(&mut self.steps));
@@ -179,7 +187,11 @@ fn steps_in_body(
     mut steps: Vec<Vector3<f64>>,
 ) -> Vec<Vector3<f64>> {
     steps.clear();
-    steps.extend(rotations.windows(2).map(|r| so3::log(&(r[0].inverse() * r[1]))));
+    steps.extend(
+        rotations
+            .windows(2)
+            .map(|r| so3::log(&(r[0].inverse() * r[1]))),
+    );
     steps
 }
 
@@ -190,8 +202,12 @@ mod tests {
     fn spinning() -> Trajectory {
         let rate = Vector3::new(0.2, -0.1, 6.0);
         let n = 101;
-        let positions = (0..n).map(|i| Vector3::new(0.01 * f64::from(i), 0.0, 1.0)).collect();
-        let rotations = (0..n).map(|i| so3::exp(&(rate * 0.01 * f64::from(i)))).collect();
+        let positions = (0..n)
+            .map(|i| Vector3::new(0.01 * f64::from(i), 0.0, 1.0))
+            .collect();
+        let rotations = (0..n)
+            .map(|i| so3::exp(&(rate * 0.01 * f64::from(i))))
+            .collect();
         Trajectory::new(5.0, 0.01, positions, rotations).unwrap()
     }
 
@@ -226,7 +242,7 @@ mod tests {
         let mut trajectory = spinning();
         let before = trajectory.pose(5.5);
         let dr = Vector3::new(0.3, 0.0, 0.0);
-        trajectory.correct(|_| [dr, Vector3::new(0.0, 1.0, 0.0)]);
+        trajectory.correct(&[[dr, Vector3::new(0.0, 1.0, 0.0)]; 101]);
         let after = trajectory.pose(5.5);
         let turn = so3::exp(&dr).to_rotation_matrix().into_inner();
         assert!((after.R - turn * before.R).norm() < 1e-12);
@@ -235,7 +251,12 @@ mod tests {
 
     #[test]
     fn unusable_samples_are_refused() {
-        let one = Trajectory::new(0.0, 0.01, vec![Vector3::zeros()], vec![so3::exp(&Vector3::x())]);
+        let one = Trajectory::new(
+            0.0,
+            0.01,
+            vec![Vector3::zeros()],
+            vec![so3::exp(&Vector3::x())],
+        );
         assert_eq!(one.unwrap_err(), TrajectoryError::TooShort(1));
     }
 }

@@ -52,7 +52,11 @@ pub fn right_jacobian_inverse(phi: &Vector3<f64>) -> Matrix3<f64> {
 
 /// Two unit vectors that complete the unit vector `axis` to a right-handed frame.
 pub fn orthogonal_pair(axis: &Vector3<f64>) -> [Vector3<f64>; 2] {
-    let away = if axis.x.abs() < 0.6 { Vector3::x() } else { Vector3::y() };
+    let away = if axis.x.abs() < 0.6 {
+        Vector3::x()
+    } else {
+        Vector3::y()
+    };
     let first = axis.cross(&away);
     let first = first / first.norm();
     [first, axis.cross(&first)]

@@ -28,9 +28,13 @@ fn head() -> Head {
 
 fn moving() -> Trajectory {
     let n = 121;
-    let positions = (0..n).map(|i| Vector3::new(0.005 * f64::from(i), 0.0, 1.5)).collect();
+    let positions = (0..n)
+        .map(|i| Vector3::new(0.005 * f64::from(i), 0.0, 1.5))
+        .collect();
     let rate = Vector3::new(0.05, 0.0, 3.0);
-    let rotations = (0..n).map(|i| so3::exp(&(rate * 0.01 * f64::from(i)))).collect();
+    let rotations = (0..n)
+        .map(|i| so3::exp(&(rate * 0.01 * f64::from(i))))
+        .collect();
     Trajectory::new(-0.05, 0.01, positions, rotations).unwrap()
 }
 
@@ -54,7 +58,11 @@ fn wall(trajectory: &Trajectory, head: &Head) -> (Vec<[f64; 3]>, Vec<f64>) {
 fn surfels_of_a_wall_lie_on_it_and_face_the_sensor() {
     let (trajectory, head) = (moving(), head());
     let (points, stamps) = wall(&trajectory, &head);
-    let points = Points { points: &points, stamps: &stamps, angles: &[] };
+    let points = Points {
+        points: &points,
+        stamps: &stamps,
+        angles: &[],
+    };
     let set = extract(points, &trajectory, &head, &settings());
     assert!((0..4).all(|l| !set.level(l).is_empty()));
     for i in 0..set.len() {
@@ -72,7 +80,11 @@ fn a_single_scan_line_is_no_surfel() {
     let (trajectory, head) = (moving(), head());
     let line: Vec<[f64; 3]> = (0..500).map(|i| [4.0, 0.01 * f64::from(i), 0.3]).collect();
     let stamps: Vec<f64> = (0..500).map(|i| 0.2 + 1e-6 * f64::from(i)).collect();
-    let points = Points { points: &line, stamps: &stamps, angles: &[] };
+    let points = Points {
+        points: &line,
+        stamps: &stamps,
+        angles: &[],
+    };
     assert!(extract(points, &trajectory, &head, &settings()).is_empty());
 }
 
@@ -85,11 +97,32 @@ fn a_pause_splits_a_cell_in_two_surfels() {
         vec![so3::exp(&Vector3::zeros()); 3],
     )
     .unwrap();
-    let head = Head { T_imu_base: Isometry3::identity(), latency: 0.0, motor: None };
-    let patch = |k: i32| [1.0 + 1e-3 * f64::from(k % 2), 0.02 * f64::from(k % 10) + 0.05, 0.02 * f64::from(k / 10) + 0.05];
+    let head = Head {
+        T_imu_base: Isometry3::identity(),
+        latency: 0.0,
+        motor: None,
+    };
+    let patch = |k: i32| {
+        [
+            1.0 + 1e-3 * f64::from(k % 2),
+            0.02 * f64::from(k % 10) + 0.05,
+            0.02 * f64::from(k / 10) + 0.05,
+        ]
+    };
     let points: Vec<[f64; 3]> = (0..200).map(|k| patch(k % 100)).collect();
-    let stamps: Vec<f64> = (0..200).map(|k| 1e-4 * f64::from(k) + if k < 100 { 0.0 } else { 1.0 }).collect();
-    let set = extract(Points { points: &points, stamps: &stamps, angles: &[] }, &still, &head, &settings());
+    let stamps: Vec<f64> = (0..200)
+        .map(|k| 1e-4 * f64::from(k) + if k < 100 { 0.0 } else { 1.0 })
+        .collect();
+    let set = extract(
+        Points {
+            points: &points,
+            stamps: &stamps,
+            angles: &[],
+        },
+        &still,
+        &head,
+        &settings(),
+    );
     assert_eq!(set.level(0).len(), 2);
 }
 

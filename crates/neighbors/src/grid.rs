@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Features sorted into the cells of a voxel grid.
+
+use std::ops::Range;
+
+const BITS: u32 = 21;
+const OFFSET: i64 = 1 << (BITS - 1);
+const MASK: u64 = (1 << BITS) - 1;
+
+/// Features sorted by grid cell, as a structure of arrays.
+///
+/// Cells of equal x and y lie behind each other in order of z, so that a column of three cells is
+/// one contiguous run.
+#[derive(Clone, Debug)]
+pub struct Grid {
+    /// Key of each non-empty cell, increasing.
+    cell_keys: Vec<u64>,
+    /// Features of cell `c` are `cell_starts[c] .. cell_starts[c + 1]`.
+    cell_starts: Vec<u32>,
+    /// Original index of each sorted feature.
+    order: Vec<u32>,
+    /// Position in cells (x, y, z), normal and time of each sorted feature.
+    columns: [Vec<f32>; 6],
+    times: Vec<f32>,
+}
+
+impl Grid {
+    /// Sorts features into cells of size `cell_size` (in the unit of the positions), which is the
+    /// largest distance that can be searched. `times` in seconds; all slices have the same length.
+    pub fn new(
+        positions: &[[f32; 3]],
+        normals: &[[f32; 3]],
+        times: &[f64],
+        cell_size: f32,
+    ) -> Self {
+        let mut keyed: Vec<(u64, u32)> = (0u32..)
+            .zip(positions)
+            .map(|(i, p)| (key_of(p, cell_size), i))
+            .collect();
+        keyed.sort_unstable();
+        let mut cell_keys = Vec::new();
+        let mut cell_starts = Vec::new();
+        for (sorted, &(key, _)) in (0u32..).zip(&keyed) {
+            if cell_keys.last() != Some(&key) {
+                cell_keys.push(key);
+                cell_starts.push(sorted);
+            }
+        }
+        cell_starts.push(keyed.len() as u32);
+        let order: Vec<u32> = keyed.iter().map(|&(_, i)| i).collect();
+        let gather = |f: &dyn Fn(usize) -> f32| order.iter().map(|&i| f(i as usize)).collect();
+        let columns = [
+            gather(&|i| positions[i][0]),
+            gather(&|i| positions[i][1]),
+            gather(&|i| positions[i][2]),
+            gather(&|i| normals[i][0]),
+            gather(&|i| normals[i][1]),
+            gather(&|i| normals[i][2]),
+        ];
+        let times = gather(&|i| times[i] as f32);
+        Self {
+            cell_keys,
+            cell_starts,
+            order,
+            columns,
+            times,
+        }
+    }
+
+    /// Number of features.
+    pub fn len(&self) -> usize {
+        self.order.len()
+    }
+
+    /// Whether there are no features.
+    pub fn is_empty(&self) -> bool {
+        self.order.is_empty()
+    }
+
+    /// Number of non-empty cells.
+    pub(crate) fn n_cells(&self) -> usize {
+        self.cell_keys.len()
+    }
+
+    /// Sorted features of cell `c`.
+    pub(crate) fn cell(&self, c: usize) -> Range<usize> {
+        self.cell_starts[c] as usize..self.cell_starts[c + 1] as usize
+    }
+
+    /// Key of cell `c`.
+    pub(crate) fn cell_key(&self, c: usize) -> u64 {
+        self.cell_keys[c]
+    }
+
+    /// Original index of sorted feature `s`.
+    pub(crate) fn original(&self, s: usize) -> u32 {
+        self.order[s]
+    }
+
+    /// The six numbers and the time of sorted feature `s`.
+    pub(crate) fn feature(&self, s: usize) -> ([f32; 6], f32) {
+        (std::array::from_fn(|d| self.columns[d][s]), self.times[s])
+    }
+
+    /// The six columns and the times of a run of sorted features.
+    pub(crate) fn run(&self, run: Range<usize>) -> ([&[f32]; 6], &[f32]) {
+        (
+            std::array::from_fn(|d| &self.columns[d][run.clone()]),
+            &self.times[run],
+        )
+    }
+
+    /// The nine runs of sorted features in the 27 cells around the cell with `key`.
+    pub(crate) fn runs_around(&self, key: u64) -> [Range<usize>; 9] {
+        let [x, y, z] = unpack(key);
+        std::array::from_fn(|c| {
+            let (x, y) = (x + (c / 3) as i64 - 1, y + (c % 3) as i64 - 1);
+            let from = self.cell_keys.partition_point(|&k| k < pack(x, y, z - 1));
+            let mut to = from;
+            let last = pack(x, y, z + 1);
+            while to < self.cell_keys.len() && self.cell_keys[to] <= last {
+                to += 1;
+            }
+            self.cell_starts[from] as usize..self.cell_starts[to] as usize
+        })
+    }
+}
+
+fn key_of(p: &[f32; 3], cell_size: f32) -> u64 {
+    let cell = |c: f32| (c / cell_size).floor() as i64;
+    pack(cell(p[0]), cell(p[1]), cell(p[2]))
+}
+
+fn pack(x: i64, y: i64, z: i64) -> u64 {
+    [x, y, z]
+        .iter()
+        .fold(0, |key, i| key << BITS | ((i + OFFSET) as u64 & MASK))
+}
+
+fn unpack(key: u64) -> [i64; 3] {
+    [key >> (2 * BITS), key >> BITS & MASK, key & MASK].map(|i| i as i64 - OFFSET)
+}

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! The constraints: each gives residuals, exact Jacobians and weights.
+
+pub mod imu;
+pub mod initial;
+pub mod motion;
+pub mod prior;
+pub mod surfel_match;
+pub mod velocity;
+
+use bentwing_trajectory::StencilWeights;
+use nalgebra::Matrix3;
+
+use crate::NormalEquations;
+use crate::rows::RowGroup;
+
+/// Rows of neighbouring samples of the trajectory, which mostly share their five control points.
+pub(crate) struct StencilRows<'a> {
+    equations: &'a mut NormalEquations,
+    group: Option<(usize, RowGroup)>,
+}
+
+impl<'a> StencilRows<'a> {
+    pub fn new(equations: &'a mut NormalEquations) -> Self {
+        Self {
+            equations,
+            group: None,
+        }
+    }
+
+    /// The group of the control points `first .. first + 5`.
+    pub fn group(&mut self, first: usize) -> &mut RowGroup {
+        if self.group.as_ref().is_none_or(|(f, _)| *f != first) {
+            self.flush();
+        }
+        &mut self
+            .group
+            .get_or_insert_with(|| (first, RowGroup::new((first..first + 5).collect())))
+            .1
+    }
+
+    pub fn flush(&mut self) {
+        if let Some((_, group)) = self.group.take() {
+            group.flush(self.equations);
+        }
+    }
+}
+
+/// Adds `Σ_m w_m J[row, :]` to the entries of the control points, at `offset` 0 for rotations and
+/// 3 for translations.
+pub(crate) fn add_stencil(
+    knots: &mut [f64],
+    stencil: &StencilWeights,
+    J: &Matrix3<f64>,
+    row: usize,
+    offset: usize,
+) {
+    for (entries, w) in knots.chunks_exact_mut(6).zip(stencil.weights) {
+        for c in 0..3 {
+            entries[offset + c] += w * J[(row, c)];
+        }
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod testing;

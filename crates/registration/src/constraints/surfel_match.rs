@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Two observations of a patch lie in one plane: `e = nᵀ (μ_i − μ_j)` (Kaul 2015, eq. 5–6).
+
+use bentwing_surfels::sym3;
+use bentwing_trajectory::{Head, so3};
+use nalgebra::{Matrix3, Vector3};
+
+use crate::index;
+use crate::placed::PlacedSurfel;
+
+/// The plane of a match: normal and weight from the sum of both covariances.
+#[derive(Clone, Copy, Debug)]
+pub struct MatchPlane {
+    /// Eigenvector of the smallest eigenvalue of `S_i + S_j`.
+    pub normal: Vector3<f64>,
+    /// `nᵀ (μ_i − μ_j)`, m.
+    pub residual: f64,
+    /// `ξ² = 1 / (σ_r² + λ1)`, m⁻².
+    pub information: f64,
+}
+
+impl MatchPlane {
+    /// The plane between a surfel and the mean and covariance of its counterpart, map frame.
+    pub fn new(
+        surfel: &PlacedSurfel,
+        mean: &Vector3<f64>,
+        covariance: &Matrix3<f64>,
+        range_sigma: f64,
+    ) -> Self {
+        let eigen = sym3::eigen(&(surfel.covariance + covariance));
+        Self {
+            normal: eigen.normal,
+            residual: eigen.normal.dot(&(surfel.mean - mean)),
+            information: 1.0 / (range_sigma * range_sigma + eigen.values[0].max(0.0)),
+        }
+    }
+}
+
+/// Writes `sign · ∂(nᵀ μ)/∂(control points)` for the four control points of `surfel`.
+///
+/// `∂μ/∂[δr, δt] = B_m [−l×, I]`, with l the lever from the IMU, so the row is `B_m [l × n, n]`.
+pub fn write_knots(knots: &mut [f64], surfel: &PlacedSurfel, n: &Vector3<f64>, sign: f64) {
+    let turn = surfel.lever.cross(n);
+    for (entries, w) in knots.chunks_exact_mut(6).zip(surfel.basis.weights) {
+        let w = sign * w;
+        for c in 0..3 {
+            entries[c] = w * turn[c];
+            entries[3 + c] = w * n[c];
+        }
+    }
+}
+
+/// Adds `sign · ∂(nᵀ μ)/∂(global states)`.
+pub fn add_globals(
+    globals: &mut [f64],
+    head: &Head,
+    surfel: &PlacedSurfel,
+    n: &Vector3<f64>,
+    sign: f64,
+) {
+    let n_imu = surfel.R_map_imu.tr_mul(n);
+    let turned = surfel.R_map_imu.tr_mul(&surfel.lever) - head.T_imu_base.translation.vector;
+    // The surfel is looked up at stamp − latency: a larger latency moves it back along its path.
+    globals[index::LATENCY] -= sign * n.dot(&surfel.velocity);
+    let rotation = turned.cross(&n_imu);
+    for c in 0..3 {
+        globals[index::EXTRINSIC_ROTATION.start + c] += sign * rotation[c];
+        globals[index::EXTRINSIC_TRANSLATION.start + c] += sign * n_imu[c];
+    }
+    if let Some(motor) = &head.motor {
+        let n_base = head.T_imu_base.rotation.inverse() * n_imu;
+        let p_base = head.T_imu_base.rotation.inverse() * turned;
+        globals[index::ENCODER_ZERO] += sign * n_base.dot(&motor.axis.cross(&p_base));
+        let n_rotor = so3::exp(&(motor.axis * -(surfel.angle + motor.zero))) * n_base;
+        let arm = motor.T_motor_lidar.rotation * surfel.mean_lidar;
+        for (k, u) in so3::orthogonal_pair(&motor.axis).iter().enumerate() {
+            globals[index::MOTOR_TILT.start + k] += sign * n_rotor.dot(&u.cross(&arm));
+            globals[index::MOTOR_OFFSET.start + k] += sign * n_rotor.dot(u);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::constraints::testing::{Scene, assert_jacobian};
+    use crate::placed::place;
+    use crate::rows::RowGroup;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn the_jacobian_agrees_with_central_differences(scene in Scene::any(), i in 0..8_usize) {
+            let set = scene.surfels();
+            let at = |trajectory: &_, globals: &_| place(&set, i, trajectory, globals);
+            let spline = scene.spline();
+            let mut surfel = at(&scene.trajectory, &scene.globals);
+            surfel.basis = spline.basis(surfel.time);
+            let n = Vector3::new(0.48, -0.6, 0.64);
+            let first = surfel.basis.first;
+            let mut group = RowGroup::new((first..first + 4).collect());
+            write_knots(group.knots_mut(), &surfel, &n, 1.0);
+            add_globals(group.globals_mut(), &scene.globals.head, &surfel, &n, 1.0);
+            assert_jacobian(&scene, &group, |t, g| n.dot(&at(t, g).mean))?;
+        }
+    }
+}

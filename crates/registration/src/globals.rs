@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! The slow states that are estimated along with the trajectory.
+
+use bentwing_trajectory::{Head, so3};
+use nalgebra::{Translation3, UnitQuaternion, Vector3};
+
+use crate::{GlobalMatrix, GlobalVector};
+
+/// Number of global states.
+pub const N_GLOBALS: usize = 20;
+
+/// Where each global state stands in a [`GlobalVector`].
+pub mod index {
+    use std::ops::Range;
+
+    /// Lidar stamps minus IMU clock, s.
+    pub const LATENCY: usize = 0;
+    /// `R_imu_base ← Exp(θ) R_imu_base`, rad, imu frame.
+    pub const EXTRINSIC_ROTATION: Range<usize> = 1..4;
+    /// Translation of `T_imu_base`, m, imu frame.
+    pub const EXTRINSIC_TRANSLATION: Range<usize> = 4..7;
+    /// Gyro bias, rad/s.
+    pub const GYRO_BIAS: Range<usize> = 7..10;
+    /// Accelerometer bias, m/s².
+    pub const ACCEL_BIAS: Range<usize> = 10..13;
+    /// Rotation of gravity about the x and y axes of the map, rad.
+    pub const GRAVITY: Range<usize> = 13..15;
+    /// Added to every encoder angle, rad.
+    pub const ENCODER_ZERO: usize = 15;
+    /// Rotation of the lidar about two axes perpendicular to the motor's, rad, motor frame.
+    pub const MOTOR_TILT: Range<usize> = 16..18;
+    /// Translation of the lidar perpendicular to the motor's axis, m, motor frame.
+    pub const MOTOR_OFFSET: Range<usize> = 18..20;
+}
+
+/// Values of the global states.
+#[derive(Clone, Debug)]
+pub struct Globals {
+    /// Latency, extrinsics and motor.
+    pub head: Head,
+    /// rad/s, imu frame.
+    pub gyro_bias: Vector3<f64>,
+    /// m/s², imu frame.
+    pub accel_bias: Vector3<f64>,
+    /// m/s², map frame, pointing up.
+    pub gravity: Vector3<f64>,
+}
+
+impl Globals {
+    /// Applies a correction.
+    pub fn correct(&mut self, delta: &GlobalVector) {
+        let three = |r: std::ops::Range<usize>| Vector3::from_column_slice(&delta[r]);
+        let head = &mut self.head;
+        head.latency += delta[index::LATENCY];
+        let base = &mut head.T_imu_base;
+        base.rotation = renormalized(so3::exp(&three(index::EXTRINSIC_ROTATION)) * base.rotation);
+        base.translation =
+            Translation3::from(base.translation.vector + three(index::EXTRINSIC_TRANSLATION));
+        self.gyro_bias += three(index::GYRO_BIAS);
+        self.accel_bias += three(index::ACCEL_BIAS);
+        let [gx, gy] = [delta[index::GRAVITY.start], delta[index::GRAVITY.start + 1]];
+        self.gravity = so3::exp(&Vector3::new(gx, gy, 0.0)) * self.gravity;
+        if let Some(motor) = &mut head.motor {
+            motor.zero += delta[index::ENCODER_ZERO];
+            let [u, v] = so3::orthogonal_pair(&motor.axis);
+            let pair = |r: std::ops::Range<usize>| u * delta[r.start] + v * delta[r.start + 1];
+            let lidar = &mut motor.T_motor_lidar;
+            lidar.rotation = renormalized(so3::exp(&pair(index::MOTOR_TILT)) * lidar.rotation);
+            lidar.translation =
+                Translation3::from(lidar.translation.vector + pair(index::MOTOR_OFFSET));
+        }
+    }
+}
+
+fn renormalized(q: UnitQuaternion<f64>) -> UnitQuaternion<f64> {
+    UnitQuaternion::new_normalize(q.into_inner())
+}
+
+/// What is known of the global states before a registration.
+#[derive(Clone, Debug)]
+pub struct GlobalPrior {
+    /// Information matrix about the values the registration starts from.
+    pub information: GlobalMatrix,
+    /// States that are not estimated at all.
+    pub frozen: [bool; N_GLOBALS],
+}

@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! The normal equations in blocks: 6×6 between control points, an arrow for the global states.
+
+use std::collections::BTreeMap;
+
+use crate::{GlobalMatrix, GlobalVector, N_GLOBALS};
+
+/// A 6×6 block, row by row.
+pub type Block = [f64; 36];
+
+/// `AᵀWA` and `AᵀW r` (Kaul 2015, eq. 4). Blocks far off the diagonal appear wherever surfels of
+/// different times match.
+#[derive(Clone, Debug)]
+pub struct NormalEquations {
+    /// Blocks `(row, column)` of the lower triangle.
+    pub(crate) blocks: BTreeMap<(usize, usize), Block>,
+    /// For each control point and global state the column of six.
+    arrow: Vec<[[f64; 6]; N_GLOBALS]>,
+    corner: GlobalMatrix,
+    knot_gradient: Vec<[f64; 6]>,
+    /// `AᵀW r` of the global states.
+    pub(crate) global_gradient: GlobalVector,
+    /// `Σ w r²`.
+    pub(crate) cost: f64,
+}
+
+impl NormalEquations {
+    /// Empty equations for `n_controls` control points; every diagonal block exists.
+    pub fn new(n_controls: usize) -> Self {
+        Self {
+            blocks: (0..n_controls).map(|k| ((k, k), [0.0; 36])).collect(),
+            arrow: vec![[[0.0; 6]; N_GLOBALS]; n_controls],
+            corner: GlobalMatrix::zeros(),
+            knot_gradient: vec![[0.0; 6]; n_controls],
+            global_gradient: [0.0; N_GLOBALS],
+            cost: 0.0,
+        }
+    }
+
+    /// Number of control points.
+    pub fn n_controls(&self) -> usize {
+        self.knot_gradient.len()
+    }
+
+    /// Adds a 6×6 block between two control points. A block that is off the diagonal of its group
+    /// (`!on_diagonal`) but joins a control point with itself stands for its transpose as well.
+    pub(crate) fn add_block(
+        &mut self,
+        row: usize,
+        column: usize,
+        on_diagonal: bool,
+        block: impl Fn(usize, usize) -> f64,
+    ) {
+        let transposed = row < column;
+        let key = if transposed {
+            (column, row)
+        } else {
+            (row, column)
+        };
+        let both = row == column && !on_diagonal;
+        let target = self.blocks.entry(key).or_insert([0.0; 36]);
+        for r in 0..6 {
+            for c in 0..6 {
+                let mut v = if transposed { block(c, r) } else { block(r, c) };
+                if both {
+                    v += block(c, r);
+                }
+                target[6 * r + c] += v;
+            }
+        }
+    }
+
+    pub(crate) fn arrow_mut(&mut self, control: usize) -> &mut [[f64; 6]; N_GLOBALS] {
+        &mut self.arrow[control]
+    }
+
+    pub(crate) fn knot_gradient_mut(&mut self, control: usize) -> &mut [f64; 6] {
+        &mut self.knot_gradient[control]
+    }
+
+    /// Adds `v` to the entries `(r, c)` and `(c, r)` of the global states.
+    pub(crate) fn add_corner(&mut self, r: usize, c: usize, v: f64) {
+        self.corner[(r, c)] += v;
+        if r != c {
+            self.corner[(c, r)] += v;
+        }
+    }
+
+    /// Columns of six between the control point and each global state.
+    pub(crate) fn arrow(&self, control: usize) -> &[[f64; 6]; N_GLOBALS] {
+        &self.arrow[control]
+    }
+
+    /// The part of the global states.
+    pub(crate) fn corner(&self) -> &GlobalMatrix {
+        &self.corner
+    }
+
+    pub(crate) fn knot_gradient(&self, control: usize) -> &[f64; 6] {
+        &self.knot_gradient[control]
+    }
+}

@@ -1,0 +1,212 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! The registration: the paper on one screen.
+
+use std::sync::Arc;
+
+use bentwing_surfels::SurfelSet;
+use bentwing_trajectory::{CorrectionSpline, Imu, Trajectory};
+use nalgebra::Vector3;
+
+use crate::constraints::{imu, initial, motion, prior, velocity};
+use crate::matches::{self, Linearization};
+use crate::placed::Placed;
+use crate::solve::{Factorized, Solution, SolveError, Solver};
+use crate::{
+    FixedView, GlobalMatrix, GlobalPrior, GlobalVector, Globals, Health, N_GLOBALS,
+    NormalEquations, Settings,
+};
+
+/// How the start of the trajectory is held.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Initial {
+    /// The first three control points stay zero: the corrected trajectory joins the frozen past
+    /// with continuous velocity and acceleration.
+    Clamped,
+    /// Only the first pose stays; there is no past.
+    FirstPose,
+}
+
+/// Input of a registration.
+pub struct Problem<'a> {
+    /// Prior trajectory.
+    pub trajectory: Trajectory,
+    /// Surfels of the trajectory.
+    pub sets: &'a [Arc<SurfelSet>],
+    /// Immovable surfels.
+    pub views: &'a [&'a FixedView],
+    /// Inertial samples, or none for a lidar alone.
+    pub imu: Option<&'a Imu>,
+    /// Global states to start from.
+    pub globals: Globals,
+    /// What is known of them.
+    pub prior: &'a GlobalPrior,
+    /// How the start is held.
+    pub initial: Initial,
+}
+
+/// Result of a registration.
+#[derive(Clone, Debug)]
+pub struct Registration {
+    /// Corrected trajectory.
+    pub trajectory: Trajectory,
+    /// Corrected global states.
+    pub globals: Globals,
+    /// Covariance of the global states; zero where frozen.
+    pub covariance: GlobalMatrix,
+    /// Matches of the last iteration.
+    pub health: Health,
+    /// Surfels that took part.
+    pub n_surfels: usize,
+    /// Outer iterations.
+    pub n_outer: usize,
+    /// Whether the last step was below the thresholds.
+    pub converged: bool,
+    /// Samples of the trajectory without inertial data.
+    pub n_blind: usize,
+}
+
+/// Corrects a trajectory and its calibration (Kaul 2015, section 2.1).
+///
+/// # Errors
+/// When the normal equations are singular or hold values that are not finite.
+pub fn register_window(
+    problem: Problem<'_>,
+    settings: &Settings,
+) -> Result<Registration, SolveError> {
+    let mut state = State::new(&problem, settings);
+    let mut solver = Solver::default();
+    let (mut converged, mut n_outer) = (false, 0);
+    let mut last = None;
+    while n_outer < settings.max_outer && !converged {
+        let placed = Placed::new(
+            problem.sets,
+            &state.trajectory,
+            &state.globals,
+            &state.spline,
+        );
+        let pairs = matches::find(&placed, problem.views, settings);
+        let fixed_rows = state.fixed_rows(&problem, settings);
+        let linearization =
+            Linearization::new(&placed, problem.views, pairs, &state.globals.head, settings);
+        let scale = if n_outer == 0 {
+            settings.first_cauchy_scale
+        } else {
+            settings.cauchy_scale
+        };
+        let mut step = state.no_step();
+        for _ in 0..settings.n_inner {
+            let mut equations = fixed_rows.clone();
+            let health = linearization.add(&mut equations, &step, scale);
+            let n_clamped = if problem.initial == Initial::Clamped {
+                3
+            } else {
+                0
+            };
+            let factorized = solver.factorize(&equations, n_clamped, &problem.prior.frozen)?;
+            step = factorized.solve();
+            last = Some((factorized, health, placed.surfels.len()));
+        }
+        converged = state.apply(&step, settings)?;
+        n_outer += 1;
+    }
+    Ok(state.finish(last, n_outer, converged))
+}
+
+/// What changes from iteration to iteration.
+struct State {
+    trajectory: Trajectory,
+    globals: Globals,
+    spline: CorrectionSpline,
+    /// How far the global states have come from the prior's mean.
+    moved: GlobalVector,
+    n_blind: usize,
+}
+
+impl State {
+    fn new(problem: &Problem<'_>, settings: &Settings) -> Self {
+        let trajectory = problem.trajectory.clone();
+        let (start, end) = (trajectory.start(), trajectory.end());
+        Self {
+            spline: CorrectionSpline::covering(start, end, settings.knot_interval),
+            trajectory,
+            globals: problem.globals.clone(),
+            moved: [0.0; N_GLOBALS],
+            n_blind: 0,
+        }
+    }
+
+    fn no_step(&self) -> Solution {
+        Solution {
+            knots: vec![[0.0; 6]; self.spline.n_controls()],
+            globals: [0.0; N_GLOBALS],
+        }
+    }
+
+    /// The rows whose weights do not change in the inner iterations.
+    fn fixed_rows(&mut self, problem: &Problem<'_>, settings: &Settings) -> NormalEquations {
+        let mut equations = NormalEquations::new(self.spline.n_controls());
+        velocity::add(&mut equations, &self.spline, settings);
+        prior::add(&mut equations, &problem.prior.information, &self.moved);
+        if problem.initial == Initial::FirstPose {
+            initial::add(&mut equations, &self.spline, self.trajectory.start());
+        }
+        match problem.imu {
+            Some(samples) => {
+                let noise = &settings.imu_noise;
+                let (t, g, s) = (&self.trajectory, &self.globals, &self.spline);
+                self.n_blind = imu::add(&mut equations, t, samples, g, s, noise);
+            }
+            None => motion::add(&mut equations, &self.trajectory, &self.spline, settings),
+        }
+        equations
+    }
+
+    /// Composes a step into the state; returns whether it was small.
+    fn apply(&mut self, step: &Solution, settings: &Settings) -> Result<bool, SolveError> {
+        let finite = |v: &[f64]| v.iter().all(|x| x.is_finite());
+        if !finite(&step.globals) || !step.knots.iter().all(|k| finite(k)) {
+            return Err(SolveError::NotFinite);
+        }
+        let spline = self.spline;
+        let (mut turn, mut shift) = (0.0_f64, 0.0_f64);
+        let mut corrections = Vec::with_capacity(self.trajectory.len());
+        for n in 0..self.trajectory.len() {
+            let d = spline.evaluate(&step.knots, self.trajectory.time(n));
+            let correction = [
+                Vector3::new(d[0], d[1], d[2]),
+                Vector3::new(d[3], d[4], d[5]),
+            ];
+            turn = turn.max(correction[0].norm());
+            shift = shift.max(correction[1].norm());
+            corrections.push(correction);
+        }
+        self.trajectory.correct(&corrections);
+        self.globals.correct(&step.globals);
+        for (m, d) in self.moved.iter_mut().zip(step.globals) {
+            *m += d;
+        }
+        Ok(turn < settings.min_rotation && shift < settings.min_translation)
+    }
+
+    fn finish(
+        self,
+        last: Option<(Factorized, Health, usize)>,
+        n_outer: usize,
+        converged: bool,
+    ) -> Registration {
+        let (covariance, health, n_surfels) = match last {
+            Some((f, health, n)) => (f.global_covariance(), health, n),
+            None => (GlobalMatrix::zeros(), Health::default(), 0),
+        };
+        Registration {
+            trajectory: self.trajectory,
+            globals: self.globals,
+            covariance,
+            health,
+            n_surfels,
+            n_outer,
+            converged,
+            n_blind: self.n_blind,
+        }
+    }
+}

@@ -3,10 +3,16 @@
 
 use pyo3::prelude::*;
 
+mod errors;
+mod raycast;
+
 /// The compiled core of bentwing.
 #[pymodule(gil_used = true)]
 mod _core {
     use pyo3::prelude::*;
+
+    #[pymodule_export]
+    use crate::raycast::Scene;
 
     #[pymodule_init]
     fn init(m: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -86,9 +86,12 @@ fn rows<'a, T: numpy::Element>(
         );
         return Err(PyValueError::new_err(message));
     }
-    let flat = array
-        .as_slice()
-        .map_err(|_| PyValueError::new_err(format!("{name}: expected a C-contiguous array")))?;
+    let not_contiguous = || PyValueError::new_err(format!("{name}: expected a C-contiguous array"));
+    // `as_slice` alone would accept Fortran order and read columns as rows.
+    if !array.is_c_contiguous() {
+        return Err(not_contiguous());
+    }
+    let flat = array.as_slice().map_err(|_| not_contiguous())?;
     Ok(flat.as_chunks().0)
 }
 

@@ -46,7 +46,8 @@ def merge(meshes: Iterable[Mesh]) -> Mesh:
     parts = list(meshes)
     offsets = np.cumsum([0, *(len(part.vertices) for part in parts[:-1])])
     triangles = [part.triangles + np.uint32(o) for part, o in zip(parts, offsets, strict=True)]
-    return Mesh(np.vstack([part.vertices for part in parts]), np.vstack(triangles))
+    vertices = np.ascontiguousarray(np.vstack([part.vertices for part in parts]))
+    return Mesh(vertices, np.vstack(triangles))
 
 
 def box(low: ArrayLike, high: ArrayLike) -> Mesh:

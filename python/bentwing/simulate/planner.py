@@ -40,9 +40,18 @@ class Tour:
     way_points: Array
 
 
-def plan_tour(world: World, rng: np.random.Generator, length: float, clearance: float) -> Tour:
-    """A tour of about `length` metres that stays `clearance` away from every surface."""
-    nodes = _free_points(world, rng, clearance)
+def plan_tour(
+    world: World,
+    rng: np.random.Generator,
+    length: float,
+    clearance: float,
+    heights: tuple[float, float] | None = None,
+) -> Tour:
+    """Plan a tour of about `length` metres that stays `clearance` away from every surface.
+
+    It fills the site's box, or follows the ground at the given heights.
+    """
+    nodes = _free_points(world, rng, clearance, heights)
     edges = _connect(world, nodes, clearance)
     home, pad = _choose_pad(world, rng, nodes, edges)
     distances, before = _shortest_paths(nodes, edges, home)
@@ -57,14 +66,29 @@ def plan_tour(world: World, rng: np.random.Generator, length: float, clearance: 
     return Tour(pad, nodes[route])
 
 
-def _free_points(world: World, rng: np.random.Generator, clearance: float) -> Array:
+def _free_points(
+    world: World,
+    rng: np.random.Generator,
+    clearance: float,
+    heights: tuple[float, float] | None,
+) -> Array:
     low, high = np.array(world.site.low), np.array(world.site.high)
     candidates = rng.uniform(low, high, size=(12 * N_NODES, 3))
+    if heights is not None:
+        candidates = _above_ground(world, candidates, rng.uniform(*heights, len(candidates)))
     free = candidates[world.clearance(candidates) > clearance]
     if len(free) < 2:
         msg = f"no place in this scene is {clearance:.1f} m away from every surface: try another seed"
         raise UsageError(msg)
     return free[:N_NODES]
+
+
+def _above_ground(world: World, points: Array, heights: Array) -> Array:
+    """Points moved to `heights` above the ground; those over tables and roofs are left out."""
+    down = np.tile([0.0, 0.0, -1.0], (len(points), 1))
+    ground = points[:, 2] - world.scene.cast(points, down, 200.0)[0]
+    moved = np.column_stack([points[:, :2], ground + heights])
+    return np.ascontiguousarray(moved[np.isfinite(ground) & (ground < world.site.pad_below)])
 
 
 def _connect(world: World, nodes: Array, clearance: float) -> list[list[int]]:

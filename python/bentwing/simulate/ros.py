@@ -11,7 +11,14 @@ from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Ros2Writer
 from rosbags.typesys import Stores, get_typestore
 
-from bentwing.simulate.records import CloudRecord, EncoderRecord, ImuRecord, Record, ScanRecord
+from bentwing.simulate.records import (
+    POINT,
+    CloudRecord,
+    EncoderRecord,
+    ImuRecord,
+    Record,
+    ScanRecord,
+)
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -22,14 +29,6 @@ if TYPE_CHECKING:
 EPOCH_NS = 1_704_067_200_000_000_000
 """The recordings begin on 1 January 2024, 00:00 UTC."""
 
-POINT = np.dtype(
-    {
-        "names": ["x", "y", "z", "intensity", "ring", "time"],
-        "formats": ["<f4", "<f4", "<f4", "<f4", "<u2", "<f4"],
-        "offsets": [0, 4, 8, 12, 16, 18],
-        "itemsize": 22,
-    }
-)
 _DATATYPES = {"<f4": 7, "<u2": 4}
 
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from bentwing.simulate.rig import Rig
 
 SceneName = Literal["courtyard", "office"]
-HeadName = Literal["hokuyo-spin"]
+HeadName = Literal["hokuyo-spin", "hokuyo-nod", "vlp16-fixed", "vlp16-motor"]
 Format = Literal["bag", "mcap", "db3"]
 
 
@@ -38,6 +38,7 @@ class Scenario(BaseModel):
     duration : s
     seed : varies geometry, motion, calibration and noise
     format : of the recording: a ROS 1 bag, or a ROS 2 folder with mcap or sqlite storage
+    motor_rate : rad/s, of a motor-turned head
     max_range : m, beyond it the lidar sees nothing; by default what the sensor can do
     noiseless : without random errors of the sensors (calibration and clock stay wrong)
     """
@@ -49,6 +50,7 @@ class Scenario(BaseModel):
     duration: float = Field(default=60.0, gt=0.0, le=3600.0)
     seed: int = Field(default=0, ge=0)
     format: Format = "bag"
+    motor_rate: float = Field(default=1.0, gt=0.0, le=10.0)
     max_range: float | None = Field(default=None, gt=1.0)
     noiseless: bool = False
 

@@ -48,14 +48,14 @@ class Phases:
 
     def activity(self, times: Array) -> Array:
         """How hard the rotors work, 0 … 1."""
-        rise = _smoothstep((times - self.rotors) / 2.5)
-        result: Array = rise * (1.0 - _smoothstep((times - self.touch) / 1.5))
+        rise = smoothstep((times - self.rotors) / 2.5)
+        result: Array = rise * (1.0 - smoothstep((times - self.touch) / 1.5))
         return result
 
     def airborne(self, times: Array) -> Array:
         """0 on the ground, 1 in the air."""
-        rise = _smoothstep((times - self.climb) / 2.0)
-        result: Array = rise * (1.0 - _smoothstep((times - self.touch + 2.0) / 2.0))
+        rise = smoothstep((times - self.climb) / 2.0)
+        result: Array = rise * (1.0 - smoothstep((times - self.touch + 2.0) / 2.0))
         return result
 
 
@@ -142,7 +142,9 @@ def _is_clear(world: World, position: Spline, phases: Phases) -> bool:
 def _with_attitude(
     rng: np.random.Generator, position: Spline, phases: Phases, duration: float
 ) -> Flight:
-    yaw = _yaw(rng, position, phases, duration)
+    yaw_knots = knot_times(YAW_STEP, duration)
+    noise = rng.normal(0.0, np.radians(4.0), len(yaw_knots)) * phases.airborne(yaw_knots)
+    yaw = smooth_heading(position, phases.cruise, phases.descent, duration, noise)
     knots = knot_times(ATTITUDE_STEP, duration)
     push = position(knots, 2) + DRAG * position(knots, 1)
     heading = yaw(knots)[:, 0]
@@ -158,19 +160,23 @@ def _with_attitude(
     return Flight(position, yaw, splines[0], splines[1], phases)
 
 
-def _yaw(rng: np.random.Generator, position: Spline, phases: Phases, duration: float) -> Spline:
-    """Roughly along the way, turning slowly, constant on the ground."""
+def smooth_heading(
+    position: Spline, start: float, end: float, duration: float, noise: Array | None = None
+) -> Spline:
+    """Follow the way's heading slowly between `start` and `end`; constant before and after."""
     knots = knot_times(YAW_STEP, duration)
-    velocity = position(np.clip(knots, phases.cruise, phases.descent), 1)
+    velocity = position(np.clip(knots, start, end), 1)
     heading = np.unwrap(np.arctan2(velocity[:, 1], velocity[:, 0]))
     width = 2
     padded = np.pad(heading, width, mode="edge")
     smooth = np.convolve(padded, np.full(2 * width + 1, 1 / (2 * width + 1)), mode="valid")
-    noise = rng.normal(0.0, np.radians(4.0), len(knots)) * phases.airborne(knots)
-    on_ground = np.clip(knots, phases.climb + 2.0, phases.touch - 2.0)
-    return Spline(YAW_STEP, np.interp(on_ground, knots, smooth + noise)[:, None])
+    smooth = smooth if noise is None else smooth + noise
+    # The spline reaches three knots ahead and back.
+    on_ground = np.clip(knots, start + 3 * YAW_STEP, end - 3 * YAW_STEP)
+    return Spline(YAW_STEP, np.interp(on_ground, knots, smooth)[:, None])
 
 
-def _smoothstep(x: Array) -> Array:
+def smoothstep(x: Array) -> Array:
+    """Rise from 0 to 1 over 0 ≤ x ≤ 1, level at both ends."""
     x = np.clip(x, 0.0, 1.0)
     return x * x * (3.0 - 2.0 * x)

@@ -3,10 +3,23 @@
 
 use pyo3::prelude::*;
 
+mod arrays;
+mod errors;
+mod raycast;
+mod registration;
+mod trajectory;
+
 /// The compiled core of bentwing.
 #[pymodule(gil_used = true)]
 mod _core {
     use pyo3::prelude::*;
+
+    #[pymodule_export]
+    use crate::raycast::Scene;
+    #[pymodule_export]
+    use crate::registration::{FixedView, Registration, Surfels, extract_surfels, register_window};
+    #[pymodule_export]
+    use crate::trajectory::{Globals, Imu, Samples};
 
     #[pymodule_init]
     fn init(m: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use faer::linalg::solvers::Solve;
 use faer::sparse::linalg::LltError as SparseError;
-use faer::sparse::solvers::{Llt as SparseLlt, SymbolicLlt};
+use faer::sparse::linalg::solvers::{Llt as SparseLlt, SymbolicLlt};
 use faer::sparse::{SparseColMat, Triplet};
 use faer::{Mat, Side};
 use thiserror::Error;

@@ -1,2 +1,12 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""simulate"""
+"""Recordings with truth: simulated worlds, flights, sensor heads and their errors.
+
+A simulation ends in a recording and enters the pipeline by the front door, like any other.
+"""
+
+from __future__ import annotations
+
+from bentwing.simulate.scenario import Scenario, simulate
+from bentwing.simulate.write import SimulatedRecording
+
+__all__ = ["Scenario", "SimulatedRecording", "simulate"]

@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Checked views of NumPy arrays: shape, layout, finiteness and order of time.
+
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use numpy::{PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods, ToPyArray};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+/// The rows of an (N, D) C-contiguous array.
+pub(crate) fn rows<'a, T: numpy::Element, const D: usize>(
+    name: &str,
+    array: &'a PyReadonlyArray2<'_, T>,
+) -> PyResult<&'a [[T; D]]> {
+    let shape = array.shape();
+    if shape[1] != D {
+        let message = format!(
+            "{name}: expected shape (N, {D}), got ({}, {})",
+            shape[0], shape[1]
+        );
+        return Err(PyValueError::new_err(message));
+    }
+    let not_contiguous = || PyValueError::new_err(format!("{name}: expected a C-contiguous array"));
+    // `as_slice` alone would accept Fortran order and read columns as rows.
+    if !array.is_c_contiguous() {
+        return Err(not_contiguous());
+    }
+    let flat = array.as_slice().map_err(|_| not_contiguous())?;
+    Ok(flat.as_chunks().0)
+}
+
+/// As [`rows`], for coordinates: refuses NaN and infinity.
+pub(crate) fn finite_rows<'a, const D: usize>(
+    name: &str,
+    array: &'a PyReadonlyArray2<'_, f64>,
+) -> PyResult<&'a [[f64; D]]> {
+    let rows = rows(name, array)?;
+    match rows
+        .iter()
+        .position(|row| !row.iter().all(|value| value.is_finite()))
+    {
+        None => Ok(rows),
+        Some(row) => {
+            let message = format!("{name}: row {row} is not finite: {:?}", rows[row]);
+            Err(PyValueError::new_err(message))
+        }
+    }
+}
+
+/// A contiguous array of `n` finite numbers.
+pub(crate) fn finite<'a>(
+    name: &str,
+    array: &'a PyReadonlyArray1<'_, f64>,
+    n: usize,
+) -> PyResult<&'a [f64]> {
+    let values = array
+        .as_slice()
+        .map_err(|_| PyValueError::new_err(format!("{name}: expected a contiguous array")))?;
+    if values.len() != n {
+        let message = format!("{name}: expected shape ({n},), got ({},)", values.len());
+        return Err(PyValueError::new_err(message));
+    }
+    match values.iter().position(|v| !v.is_finite()) {
+        None => Ok(values),
+        Some(i) => Err(PyValueError::new_err(format!(
+            "{name}: element {i} is not finite: {}",
+            values[i]
+        ))),
+    }
+}
+
+/// As [`finite`], and non-decreasing.
+pub(crate) fn times<'a>(
+    name: &str,
+    array: &'a PyReadonlyArray1<'_, f64>,
+    n: usize,
+) -> PyResult<&'a [f64]> {
+    let times = finite(name, array, n)?;
+    match times.windows(2).position(|t| t[1] < t[0]) {
+        None => Ok(times),
+        Some(i) => {
+            let message = format!(
+                "{name}: must not decrease, but element {} is {} after {}",
+                i + 1,
+                times[i + 1],
+                times[i]
+            );
+            Err(PyValueError::new_err(message))
+        }
+    }
+}
+
+/// Three-vectors of the rows.
+pub(crate) fn vectors(rows: &[[f64; 3]]) -> Vec<Vector3<f64>> {
+    rows.iter().map(|r| Vector3::from(*r)).collect()
+}
+
+/// A unit quaternion from x, y, z, w; refuses norms that are not one.
+pub(crate) fn unit_quaternion(name: &str, q: &[f64; 4]) -> PyResult<UnitQuaternion<f64>> {
+    let q = Quaternion::new(q[3], q[0], q[1], q[2]);
+    if (q.norm() - 1.0).abs() > 1e-3 {
+        let message = format!("{name}: expected a unit quaternion, got norm {}", q.norm());
+        return Err(PyValueError::new_err(message));
+    }
+    Ok(UnitQuaternion::new_normalize(q))
+}
+
+/// An (N, D) array from rows.
+pub(crate) fn to_array2<'py, const D: usize>(
+    py: Python<'py>,
+    rows: &[[f64; D]],
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    use numpy::PyArrayMethods;
+    rows.as_flattened().to_pyarray(py).reshape([rows.len(), D])
+}

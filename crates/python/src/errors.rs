@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! The one place that releases the GIL, and the one that turns Rust errors into Python's.
+
+use bentwing_registration::SolveError;
+use pyo3::exceptions::PyRuntimeError;
+use pyo3::marker::Ungil;
+use pyo3::prelude::*;
+
+/// Runs `work` without the GIL, so that other Python threads go on.
+///
+/// The arrays `work` reads must not be modified meanwhile; nothing can prevent that.
+#[expect(
+    clippy::disallowed_methods,
+    reason = "everyone else calls this function"
+)]
+pub(crate) fn detached<T: Ungil>(py: Python<'_>, work: impl Ungil + FnOnce() -> T) -> T {
+    py.detach(work)
+}
+
+/// As [`detached`], in a pool of its own with `threads` threads (0: one per core).
+pub(crate) fn in_pool<T: Ungil + Send>(
+    py: Python<'_>,
+    threads: usize,
+    work: impl Ungil + Send + FnOnce() -> T,
+) -> PyResult<T> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    let pool = pool.map_err(|e| PyRuntimeError::new_err(format!("threads: {e}")))?;
+    Ok(detached(py, || pool.install(work)))
+}
+
+/// The Python exception for a failed solution.
+pub(crate) fn solve_error(py: Python<'_>, error: &SolveError) -> PyErr {
+    let name = match error {
+        SolveError::Singular { .. } => "SingularSystemError",
+        SolveError::NotFinite => "DivergedError",
+        _ => "EstimationError",
+    };
+    let class = py.import("bentwing.errors").and_then(|m| m.getattr(name));
+    match class.and_then(|c| c.call1((error.to_string(),))) {
+        Ok(exception) => PyErr::from_value(exception),
+        Err(failed) => failed,
+    }
+}

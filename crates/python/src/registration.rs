@@ -1,0 +1,351 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! `_core.extract_surfels` and `_core.register_window`.
+
+use std::sync::Arc;
+
+use bentwing_registration as core;
+use bentwing_registration::{FixedView as RustView, GlobalPrior, Initial, N_GLOBALS, Problem};
+use bentwing_surfels::{Points, SurfelSet};
+use nalgebra::Matrix3;
+use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, ToPyArray};
+use pyo3::prelude::*;
+
+use crate::arrays::{finite, finite_rows, times, to_array2};
+use crate::errors::{in_pool, solve_error};
+use crate::trajectory::{Globals, Imu, Samples};
+
+#[derive(FromPyObject)]
+struct SurfelSettings {
+    voxel_size: f64,
+    n_levels: usize,
+    max_gap: f64,
+    max_span: f64,
+    min_points: u32,
+    min_planarity: f64,
+    min_width_ratio: f64,
+    min_width: f64,
+}
+
+#[derive(FromPyObject)]
+struct RegistrationSettings {
+    knot_interval: f64,
+    range_sigma: f64,
+    n_neighbors: usize,
+    max_match_distance: f64,
+    min_match_gap: f64,
+    first_cauchy_scale: f64,
+    cauchy_scale: f64,
+    max_outer: usize,
+    n_inner: usize,
+    min_translation: f64,
+    min_rotation: f64,
+    velocity_sigma: f64,
+    rate_sigma: f64,
+    gyro_sigma: f64,
+    accel_sigma: f64,
+    motion_accel_density: f64,
+    motion_angular_density: f64,
+}
+
+impl From<RegistrationSettings> for core::Settings {
+    fn from(s: RegistrationSettings) -> Self {
+        Self {
+            knot_interval: s.knot_interval,
+            range_sigma: s.range_sigma,
+            n_neighbors: s.n_neighbors,
+            max_match_distance: s.max_match_distance,
+            min_match_gap: s.min_match_gap,
+            first_cauchy_scale: s.first_cauchy_scale,
+            cauchy_scale: s.cauchy_scale,
+            max_outer: s.max_outer,
+            n_inner: s.n_inner,
+            min_translation: s.min_translation,
+            min_rotation: s.min_rotation,
+            velocity_sigma: s.velocity_sigma,
+            rate_sigma: s.rate_sigma,
+            imu_noise: core::ImuNoise {
+                gyro: s.gyro_sigma,
+                accel: s.accel_sigma,
+            },
+            motion_accel_density: s.motion_accel_density,
+            motion_angular_density: s.motion_angular_density,
+        }
+    }
+}
+
+/// Surfels of a stretch of time, in the lidar frame at their mean stamps.
+#[pyclass(frozen, module = "bentwing._core")]
+pub(crate) struct Surfels(Arc<SurfelSet>);
+
+#[pymethods]
+impl Surfels {
+    fn __len__(&self) -> usize {
+        self.0.len()
+    }
+
+    /// Mean stamps (N,), s, lidar clock.
+    #[getter]
+    fn stamps<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.0.stamps.to_pyarray(py)
+    }
+
+    /// Means (N, 3), m, lidar frame.
+    #[getter]
+    fn means<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        to_array2(
+            py,
+            &self
+                .0
+                .means
+                .iter()
+                .map(|&m| m.into())
+                .collect::<Vec<[f64; 3]>>(),
+        )
+    }
+
+    /// Unit normals (N, 3) towards the sensor, lidar frame.
+    #[getter]
+    fn normals<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        to_array2(
+            py,
+            &self
+                .0
+                .normals
+                .iter()
+                .map(|&n| n.into())
+                .collect::<Vec<[f64; 3]>>(),
+        )
+    }
+
+    /// Voxel size of each surfel's level (N,), m.
+    #[getter]
+    fn voxel_sizes<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        let of_level = |l: usize| self.0.level(l).map(move |_| self.0.voxel_sizes[l]);
+        (0..self.0.n_levels())
+            .flat_map(of_level)
+            .collect::<Vec<f64>>()
+            .to_pyarray(py)
+    }
+}
+
+/// Extracts surfels from lidar points placed with `samples`.
+#[pyfunction]
+#[pyo3(signature = (points, stamps, angles, samples, globals, *, settings, threads = 0))]
+#[allow(clippy::too_many_arguments, reason = "the arrays of a batch")]
+pub(crate) fn extract_surfels(
+    py: Python<'_>,
+    points: PyReadonlyArray2<'_, f64>,
+    stamps: PyReadonlyArray1<'_, f64>,
+    angles: Option<PyReadonlyArray1<'_, f64>>,
+    samples: &Samples,
+    globals: &Globals,
+    settings: SurfelSettings,
+    threads: usize,
+) -> PyResult<Surfels> {
+    let points = finite_rows("points", &points)?;
+    let stamps = times("stamps", &stamps, points.len())?;
+    let angles = match &angles {
+        Some(a) => finite("angles", a, points.len())?,
+        None => &[],
+    };
+    let settings = bentwing_surfels::Settings {
+        voxel_size: settings.voxel_size,
+        n_levels: settings.n_levels,
+        max_gap: settings.max_gap,
+        max_span: settings.max_span,
+        min_points: settings.min_points,
+        min_planarity: settings.min_planarity,
+        min_width_ratio: settings.min_width_ratio,
+        min_width: settings.min_width,
+    };
+    let points = Points {
+        points,
+        stamps,
+        angles,
+    };
+    let (samples, head) = (&samples.0, &globals.0.head);
+    let set = in_pool(py, threads, || {
+        bentwing_surfels::extract(points, samples, head, &settings)
+    })?;
+    Ok(Surfels(Arc::new(set)))
+}
+
+/// Immovable surfels in the map.
+#[pyclass(frozen, module = "bentwing._core")]
+pub(crate) struct FixedView(RustView);
+
+#[pymethods]
+impl FixedView {
+    /// Freezes the surfels with stamps in `[start, stop)` where `samples` puts them.
+    #[new]
+    fn new(
+        py: Python<'_>,
+        sets: Vec<PyRef<'_, Surfels>>,
+        start: f64,
+        stop: f64,
+        samples: &Samples,
+        globals: &Globals,
+    ) -> PyResult<Self> {
+        let sets: Vec<&SurfelSet> = sets.iter().map(|s| s.0.as_ref()).collect();
+        let (samples, globals) = (&samples.0, &globals.0);
+        in_pool(py, 1, || {
+            RustView::freeze(&sets, start, stop, samples, globals)
+        })
+        .map(Self)
+    }
+
+    fn __len__(&self) -> usize {
+        self.0.len()
+    }
+}
+
+/// Result of a registration.
+#[pyclass(frozen, module = "bentwing._core")]
+pub(crate) struct Registration(core::Registration);
+
+#[pymethods]
+impl Registration {
+    /// Corrected trajectory.
+    #[getter]
+    fn samples(&self) -> Samples {
+        Samples(self.0.trajectory.clone())
+    }
+
+    /// Corrected slow states.
+    #[getter]
+    fn globals(&self) -> Globals {
+        Globals(self.0.globals.clone())
+    }
+
+    /// Covariance (20, 20) of the slow states; zero where frozen.
+    #[getter]
+    fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let rows: Vec<[f64; N_GLOBALS]> = self
+            .0
+            .covariance
+            .row_iter()
+            .map(|r| std::array::from_fn(|c| r[c]))
+            .collect();
+        to_array2(py, &rows)
+    }
+
+    /// Surfels that took part.
+    #[getter]
+    fn n_surfels(&self) -> usize {
+        self.0.n_surfels
+    }
+
+    /// Matches within the window.
+    #[getter]
+    fn n_matches(&self) -> usize {
+        self.0.health.n_moving
+    }
+
+    /// Matches with fixed views.
+    #[getter]
+    fn n_fixed_matches(&self) -> usize {
+        self.0.health.n_fixed
+    }
+
+    /// Share of the matches with a residual below two standard deviations.
+    #[getter]
+    fn inlier_share(&self) -> f64 {
+        let health = &self.0.health;
+        health.n_inliers as f64 / (health.n_moving + health.n_fixed).max(1) as f64
+    }
+
+    /// Weighted root mean square of the matches' residuals in standard deviations.
+    #[getter]
+    fn residual_rms(&self) -> f64 {
+        let health = &self.0.health;
+        (health.squared_residual / health.weight.max(f64::MIN_POSITIVE)).sqrt()
+    }
+
+    /// Eigenvalues (3,) of the mean outer product of the matches' normals, increasing.
+    #[getter]
+    fn translation_eigenvalues(&self) -> [f64; 3] {
+        eigenvalues(&self.0.health.translation, self.0.health.weight)
+    }
+
+    /// Eigenvalues (3,) of the mean outer product of the rotations the matches see, increasing.
+    #[getter]
+    fn rotation_eigenvalues(&self) -> [f64; 3] {
+        eigenvalues(&self.0.health.rotation, self.0.health.weight)
+    }
+
+    /// Direction (3,) in the map in which the matches say least about the translation.
+    #[getter]
+    fn weakest_direction(&self) -> [f64; 3] {
+        bentwing_surfels::sym3::eigen(&self.0.health.translation)
+            .normal
+            .into()
+    }
+
+    /// Outer iterations.
+    #[getter]
+    fn n_outer(&self) -> usize {
+        self.0.n_outer
+    }
+
+    /// Whether the last step was below the thresholds.
+    #[getter]
+    fn converged(&self) -> bool {
+        self.0.converged
+    }
+
+    /// Samples of the trajectory without inertial data.
+    #[getter]
+    fn n_blind(&self) -> usize {
+        self.0.n_blind
+    }
+}
+
+fn eigenvalues(sum: &Matrix3<f64>, weight: f64) -> [f64; 3] {
+    bentwing_surfels::sym3::eigen(&(sum / weight.max(f64::MIN_POSITIVE))).values
+}
+
+/// Corrects `samples` and `globals` by surfel matches and inertial samples.
+#[pyfunction]
+#[pyo3(signature = (
+    samples, surfels, views, imu, globals, *, information, frozen, clamped, settings, threads = 0,
+))]
+#[allow(clippy::too_many_arguments, reason = "the parts of a problem")]
+pub(crate) fn register_window(
+    py: Python<'_>,
+    samples: &Samples,
+    surfels: Vec<PyRef<'_, Surfels>>,
+    views: Vec<PyRef<'_, FixedView>>,
+    imu: Option<&Imu>,
+    globals: &Globals,
+    information: PyReadonlyArray2<'_, f64>,
+    frozen: [bool; N_GLOBALS],
+    clamped: bool,
+    settings: RegistrationSettings,
+    threads: usize,
+) -> PyResult<Registration> {
+    let information: &[[f64; N_GLOBALS]] = finite_rows("information", &information)?;
+    let information = core::GlobalMatrix::from_fn(|r, c| information[r][c]);
+    let sets: Vec<Arc<SurfelSet>> = surfels.iter().map(|s| Arc::clone(&s.0)).collect();
+    let views: Vec<&RustView> = views.iter().map(|v| &v.0).collect();
+    let imu = imu.map(|imu| &imu.0);
+    let problem = Problem {
+        trajectory: samples.0.clone(),
+        sets: &sets,
+        views: &views,
+        imu,
+        globals: globals.0.clone(),
+        prior: &GlobalPrior {
+            information,
+            frozen,
+        },
+        initial: if clamped {
+            Initial::Clamped
+        } else {
+            Initial::FirstPose
+        },
+    };
+    let settings = settings.into();
+    in_pool(py, threads, || core::register_window(problem, &settings))?
+        .map(Registration)
+        .map_err(|e| solve_error(py, &e))
+}

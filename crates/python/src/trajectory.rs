@@ -1,0 +1,302 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! `_core.Samples`, `_core.Imu`, `_core.Globals`: what the estimator carries along.
+
+use bentwing_registration::Globals as RustGlobals;
+use bentwing_trajectory::{
+    Head, Imu as RustImu, Motor, Trajectory, extend_constant_velocity, extend_inertial,
+};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, ToPyArray};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use crate::arrays::{finite_rows, times, to_array2, unit_quaternion, vectors};
+use crate::errors::in_pool;
+
+/// Poses of the IMU in the map at a uniform rate.
+#[pyclass(frozen, module = "bentwing._core")]
+pub(crate) struct Samples(pub(crate) Trajectory);
+
+#[pymethods]
+impl Samples {
+    #[new]
+    fn new(
+        start: f64,
+        dt: f64,
+        positions: PyReadonlyArray2<'_, f64>,
+        quats_xyzw: PyReadonlyArray2<'_, f64>,
+    ) -> PyResult<Self> {
+        let positions = vectors(finite_rows("positions", &positions)?);
+        let quats = finite_rows("quats_xyzw", &quats_xyzw)?;
+        let rotations: PyResult<Vec<_>> = quats
+            .iter()
+            .map(|q| unit_quaternion("quats_xyzw", q))
+            .collect();
+        Trajectory::new(start, dt, positions, rotations?)
+            .map(Self)
+            .map_err(|e| PyValueError::new_err(e.to_string()))
+    }
+
+    /// Time of the first sample, s.
+    #[getter]
+    fn start(&self) -> f64 {
+        self.0.start()
+    }
+
+    /// Time of the last sample, s.
+    #[getter]
+    fn end(&self) -> f64 {
+        self.0.end()
+    }
+
+    /// Number of samples.
+    fn __len__(&self) -> usize {
+        self.0.len()
+    }
+
+    /// Positions (N, 3), m, map frame.
+    #[getter]
+    fn positions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let rows: Vec<[f64; 3]> = self.0.positions().iter().map(|&p| p.into()).collect();
+        to_array2(py, &rows)
+    }
+
+    /// Rotations (N, 4) as unit quaternions x, y, z, w.
+    #[getter]
+    fn quats_xyzw<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let rows: Vec<[f64; 4]> = self
+            .0
+            .rotations()
+            .iter()
+            .map(|q| [q.i, q.j, q.k, q.w])
+            .collect();
+        to_array2(py, &rows)
+    }
+
+    /// Samples `first` to `last`, both included.
+    fn slice(&self, first: usize, last: usize) -> PyResult<Self> {
+        if first >= last || last >= self.0.len() {
+            let message = format!(
+                "samples {first} to {last} of {} cannot be cut",
+                self.0.len()
+            );
+            return Err(PyValueError::new_err(message));
+        }
+        Trajectory::new(
+            self.0.time(first),
+            self.0.dt(),
+            self.0.positions()[first..=last].to_vec(),
+            self.0.rotations()[first..=last].to_vec(),
+        )
+        .map(Self)
+        .map_err(|e| PyValueError::new_err(e.to_string()))
+    }
+
+    /// These samples extended to `until` by the IMU, or at constant velocity without one; and the
+    /// number of samples for which the IMU had a gap.
+    fn extended(&self, imu: Option<&Imu>, globals: &Globals, until: f64) -> (Self, usize) {
+        let mut trajectory = self.0.clone();
+        let n_blind = match imu {
+            None => {
+                extend_constant_velocity(&mut trajectory, until);
+                0
+            }
+            Some(imu) => {
+                let g = &globals.0;
+                extend_inertial(
+                    &mut trajectory,
+                    &imu.0,
+                    &g.gyro_bias,
+                    &g.accel_bias,
+                    &g.gravity,
+                    until,
+                )
+            }
+        };
+        (Self(trajectory), n_blind)
+    }
+
+    /// Lidar points (N, 3) placed in the map.
+    #[pyo3(signature = (points, stamps, angles, globals, *, threads = 0))]
+    fn place<'py>(
+        &self,
+        py: Python<'py>,
+        points: PyReadonlyArray2<'py, f64>,
+        stamps: PyReadonlyArray1<'py, f64>,
+        angles: Option<PyReadonlyArray1<'py, f64>>,
+        globals: &Globals,
+        threads: usize,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let points = finite_rows("points", &points)?;
+        let stamps = times("stamps", &stamps, points.len())?;
+        let angles = match &angles {
+            Some(a) => crate::arrays::finite("angles", a, points.len())?,
+            None => &[],
+        };
+        let head = &globals.0.head;
+        let placed = in_pool(py, threads, || {
+            bentwing_surfels::place_points(points, stamps, angles, &self.0, head)
+        })?;
+        to_array2(py, &placed)
+    }
+}
+
+/// Inertial samples in time order.
+#[pyclass(frozen, module = "bentwing._core")]
+pub(crate) struct Imu(pub(crate) RustImu);
+
+#[pymethods]
+impl Imu {
+    #[new]
+    fn new(
+        stamps: PyReadonlyArray1<'_, f64>,
+        gyro: PyReadonlyArray2<'_, f64>,
+        accel: PyReadonlyArray2<'_, f64>,
+    ) -> PyResult<Self> {
+        let gyro = vectors(finite_rows("gyro", &gyro)?);
+        let accel = vectors(finite_rows("accel", &accel)?);
+        let stamps = times("times", &stamps, gyro.len())?.to_vec();
+        if accel.len() != gyro.len() {
+            let message = format!("accel: expected {} rows, got {}", gyro.len(), accel.len());
+            return Err(PyValueError::new_err(message));
+        }
+        Ok(Self(RustImu::new(stamps, gyro, accel)))
+    }
+
+    fn __len__(&self) -> usize {
+        self.0.len()
+    }
+}
+
+/// The slow states: latency, extrinsics, motor, biases, gravity.
+#[pyclass(frozen, module = "bentwing._core")]
+pub(crate) struct Globals(pub(crate) RustGlobals);
+
+#[derive(FromPyObject)]
+struct Transform([f64; 3], [f64; 4]);
+
+impl Transform {
+    fn isometry(&self, name: &str) -> PyResult<Isometry3<f64>> {
+        let q = unit_quaternion(name, &self.1)?;
+        Ok(Isometry3::from_parts(
+            Translation3::from(Vector3::from(self.0)),
+            q,
+        ))
+    }
+}
+
+#[pymethods]
+impl Globals {
+    /// Transforms are pairs of translation (3) and quaternion x, y, z, w.
+    #[new]
+    #[pyo3(signature = (
+        T_imu_base, *, latency, gyro_bias, accel_bias, gravity,
+        motor_axis = None, encoder_zero = 0.0, T_motor_lidar = None,
+    ))]
+    fn new(
+        T_imu_base: Transform,
+        latency: f64,
+        gyro_bias: [f64; 3],
+        accel_bias: [f64; 3],
+        gravity: [f64; 3],
+        motor_axis: Option<[f64; 3]>,
+        encoder_zero: f64,
+        T_motor_lidar: Option<Transform>,
+    ) -> PyResult<Self> {
+        let motor = match (motor_axis, T_motor_lidar) {
+            (None, None) => None,
+            (Some(axis), Some(T)) => {
+                let axis = Vector3::from(axis).try_normalize(1e-9);
+                let zero_axis = || PyValueError::new_err("motor_axis: expected a non-zero vector");
+                Some(Motor {
+                    axis: axis.ok_or_else(zero_axis)?,
+                    zero: encoder_zero,
+                    T_motor_lidar: T.isometry("T_motor_lidar")?,
+                })
+            }
+            _ => {
+                let message = "motor_axis and T_motor_lidar go together";
+                return Err(PyValueError::new_err(message));
+            }
+        };
+        let head = Head {
+            T_imu_base: T_imu_base.isometry("T_imu_base")?,
+            latency,
+            motor,
+        };
+        Ok(Self(RustGlobals {
+            head,
+            gyro_bias: gyro_bias.into(),
+            accel_bias: accel_bias.into(),
+            gravity: gravity.into(),
+        }))
+    }
+
+    /// Lidar stamps minus IMU clock, s.
+    #[getter]
+    fn latency(&self) -> f64 {
+        self.0.head.latency
+    }
+
+    /// Translation of the lidar (or motor) in the IMU frame, m.
+    #[getter]
+    fn base_translation<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        vector(py, &self.0.head.T_imu_base.translation.vector)
+    }
+
+    /// Rotation of the lidar (or motor) in the IMU frame, x, y, z, w.
+    #[getter]
+    fn base_quat_xyzw<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        quaternion(py, &self.0.head.T_imu_base.rotation)
+    }
+
+    /// Gyro bias, rad/s.
+    #[getter]
+    fn gyro_bias<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        vector(py, &self.0.gyro_bias)
+    }
+
+    /// Accelerometer bias, m/s².
+    #[getter]
+    fn accel_bias<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        vector(py, &self.0.accel_bias)
+    }
+
+    /// Gravity, m/s², map frame, pointing up.
+    #[getter]
+    fn gravity<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        vector(py, &self.0.gravity)
+    }
+
+    /// Added to every encoder angle, rad; zero without a motor.
+    #[getter]
+    fn encoder_zero(&self) -> f64 {
+        self.0.head.motor.map_or(0.0, |m| m.zero)
+    }
+
+    /// Translation of the lidar in the rotating motor frame, m; none without a motor.
+    #[getter]
+    fn motor_lidar_translation<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
+        self.0
+            .head
+            .motor
+            .map(|m| vector(py, &m.T_motor_lidar.translation.vector))
+    }
+
+    /// Rotation of the lidar in the rotating motor frame, x, y, z, w; none without a motor.
+    #[getter]
+    fn motor_lidar_quat_xyzw<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
+        self.0
+            .head
+            .motor
+            .map(|m| quaternion(py, &m.T_motor_lidar.rotation))
+    }
+}
+
+fn vector<'py>(py: Python<'py>, v: &Vector3<f64>) -> Bound<'py, PyArray1<f64>> {
+    v.as_slice().to_pyarray(py)
+}
+
+fn quaternion<'py>(py: Python<'py>, q: &UnitQuaternion<f64>) -> Bound<'py, PyArray1<f64>> {
+    [q.i, q.j, q.k, q.w].to_pyarray(py)
+}

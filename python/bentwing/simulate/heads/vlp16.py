@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""A VLP-16 under a quadrotor whose IMU sits on the body: fixed, or turned by a motor.
+
+Turned as in Fu 2023 and Tazir 2020: the lidar lies on its side, its own axis perpendicular to
+the motor's, and the motor's axis is the carrier's vertical, so that half a turn sees everything.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bentwing.simulate.heads.airframe import quadrotor
+from bentwing.simulate.heads.joints import Mount, Turn
+from bentwing.simulate.lidars.vlp16 import Vlp16
+from bentwing.simulate.rig import Encoder, Head
+from bentwing.simulate.splines import Spline, knot_times
+
+if TYPE_CHECKING:
+    from typing import Any
+
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+AXIS = np.array([0.0, 0.0, 1.0])
+ON_ITS_SIDE = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+"""R_motor_lidar: the lidar's x down, its own axis z along the motor's x."""
+
+T_body_imu = Mount(np.eye(3), np.array([0.03, 0.0, 0.02]))
+MOTOR_STEP = 0.1
+
+
+def vlp16_fixed(rng: np.random.Generator, max_range: float) -> Head:
+    """The lidar level under the body."""
+    lidar = Vlp16(max_range=max_range)
+    nominal = Mount(np.eye(3), np.array([0.02, 0.0, -0.14]))
+    true = nominal.perturbed(rng, np.radians(0.5), 0.004)
+    payload = {
+        "lidar": _lidar(lidar),
+        "T_imu_lidar": nominal.as_dict(),
+        "self_hits": [{"box": {"min": [-0.65, -0.65, -0.35], "max": [0.65, 0.65, 0.3]}}],
+    }
+    truth = {"T_imu_lidar": true.as_dict()}
+    return Head([T_body_imu], [true], quadrotor(), lidar, payload, truth)
+
+
+def vlp16_motor(rng: np.random.Generator, rate: float, duration: float, max_range: float) -> Head:
+    """The lidar on a motor that turns at `rate` rad/s, with an encoder."""
+    lidar = Vlp16(max_range=max_range)
+    motor = Mount(np.eye(3), np.array([0.0, 0.0, -0.10]))
+    nominal = Mount(ON_ITS_SIDE, np.array([0.0, 0.0, -0.07]))
+    # What is unknown of T_imu_lidar sits before the motor, the misalignment behind it.
+    true_motor = motor.perturbed(rng, np.radians(0.3), 0.003)
+    true = nominal.perturbed(rng, np.radians(0.25), 0.002)
+    angle = _motor_angle(rng, rate, duration)
+    encoder = Encoder(angle, zero=float(rng.uniform(-0.004, 0.004)), sigma=2e-4)
+    payload = {
+        "lidar": _lidar(lidar),
+        "self_hits": [{"box": {"min": [-0.3, -0.65, -0.65], "max": [0.32, 0.65, 0.65]}}],
+        "encoder": {"topic": "/encoder", "axis": AXIS.tolist(), **_motor(motor, nominal)},
+    }
+    truth = {"encoder": _motor(true_motor, true), "encoder_zero": round(encoder.zero, 9)}
+    joints = [true_motor, Turn(AXIS, angle), true]
+    return Head([T_body_imu], joints, quadrotor(), lidar, payload, truth, encoder)
+
+
+def _lidar(lidar: Vlp16) -> dict[str, Any]:
+    return {
+        "topic": lidar.topic,
+        "kind": "vlp16",
+        "min_range": 0.5,
+        "max_range": lidar.max_range,
+        "range_sigma": lidar.noise,
+    }
+
+
+def _motor(T_imu_motor: Mount, T_motor_lidar: Mount) -> dict[str, Any]:
+    return {"T_imu_motor": T_imu_motor.as_dict(), "T_motor_lidar": T_motor_lidar.as_dict()}
+
+
+def _motor_angle(rng: np.random.Generator, rate: float, duration: float) -> Spline:
+    """From rest to `rate` within about a second, then with half a percent of ripple."""
+    knots = knot_times(MOTOR_STEP, duration)
+    drive = np.clip((knots - 1.0) / 1.0, 0.0, 1.0)
+    speed = rate * drive * (1.0 + rng.normal(0.0, 0.005, len(knots)))
+    angle = rng.uniform(0.0, 2 * np.pi) + np.cumsum(speed) * MOTOR_STEP
+    return Spline(MOTOR_STEP, angle[:, None])

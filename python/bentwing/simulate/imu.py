@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""What an IMU measures: white noise, walking biases and the rotors' vibration."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bentwing.simulate.kinematics import Motion, apply
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+GRAVITY = np.array([0.0, 0.0, 9.80665])
+RATE_HZ = 200.0
+NODE_RATE_HZ = 100.0
+"""The rate at which estimators combine samples, for the density that includes the vibration."""
+
+
+@dataclass(frozen=True, slots=True)
+class ImuErrors:
+    """Errors of the IMU; zeros make it perfect.
+
+    Attributes
+    ----------
+    gyro_noise, accel_noise : rad/s/√Hz and m/s²/√Hz, white noise densities
+    gyro_bias_walk, accel_bias_walk : rad/s²/√Hz and m/s³/√Hz
+    gyro_bias, accel_bias : rad/s and m/s², size of the initial bias per axis
+    gyro_vibration, accel_vibration : rad/s and m/s², amplitude of the rotor tone in flight
+    rotor_hz : Hz, frequency of the rotor tone
+    """
+
+    gyro_noise: float = 5e-4
+    accel_noise: float = 8e-4
+    gyro_bias_walk: float = 1e-5
+    accel_bias_walk: float = 1e-4
+    gyro_bias: float = 0.01
+    accel_bias: float = 0.06
+    gyro_vibration: float = 0.015
+    accel_vibration: float = 1.5
+    rotor_hz: float = 90.0
+
+    def densities(self) -> tuple[float, float]:
+        """Gyro and accelerometer densities with what is left of the vibration after averaging.
+
+        The rotor tone is damped by the averaging over two samples to cos²(π f T); harmonics and
+        the tone's wandering alias to low frequencies and add about 2 % of its amplitude.
+        """
+        left = np.cos(np.pi * self.rotor_hz / RATE_HZ) ** 2 / np.sqrt(2) + 0.02
+        white = (self.gyro_noise, self.accel_noise)
+        tones = (self.gyro_vibration, self.accel_vibration)
+        both = [np.hypot(w, left * a / np.sqrt(NODE_RATE_HZ)) for w, a in zip(white, tones)]
+        return float(both[0]), float(both[1])
+
+
+PERFECT = ImuErrors(*[0.0] * 8)
+
+
+@dataclass(slots=True)
+class Imu:
+    """Samples in time order, `sample` after `sample`.
+
+    Attributes
+    ----------
+    activity : how hard the rotors work (0 … 1) at given times
+    biases : (6,) current gyro and accelerometer bias
+    """
+
+    errors: ImuErrors
+    rng: np.random.Generator
+    activity: Callable[[Array], Array]
+    biases: Array = field(init=False)
+    _phase: float = field(init=False)
+    _directions: Array = field(init=False)
+
+    def __post_init__(self) -> None:
+        sizes = np.repeat([self.errors.gyro_bias, self.errors.accel_bias], 3)
+        self.biases = self.rng.uniform(-1.0, 1.0, 6) * sizes
+        self._phase = self.rng.uniform(0.0, 2 * np.pi)
+        self._directions = self.rng.uniform(0.5, 1.0, 6), self.rng.uniform(0.0, 2 * np.pi, (3, 6))
+
+    def sample(self, times: Array, motion: Motion) -> tuple[Array, Array]:
+        """Gyro and accelerometer (M, 3) at `times`, given the IMU frame's true motion."""
+        ideal = np.hstack([motion.omega, specific_force(motion)])
+        measured = ideal + self._walk(len(times)) + self._noise(len(times)) + self._vibrate(times)
+        return measured[:, :3], measured[:, 3:]
+
+    def _walk(self, n: int) -> Array:
+        e = self.errors
+        steps = np.repeat([e.gyro_bias_walk, e.accel_bias_walk], 3) / np.sqrt(RATE_HZ)
+        walk = self.biases + np.cumsum(self.rng.normal(size=(n, 6)) * steps, axis=0)
+        self.biases = walk[-1]
+        return walk
+
+    def _noise(self, n: int) -> Array:
+        sigma = np.repeat([self.errors.gyro_noise, self.errors.accel_noise], 3) * np.sqrt(RATE_HZ)
+        return self.rng.normal(size=(n, 6)) * sigma
+
+    def _vibrate(self, times: Array) -> Array:
+        """The rotor tone, its frequency wandering, and two harmonics past the sensor's filter."""
+        e = self.errors
+        gains, offsets = self._directions
+        frequency = e.rotor_hz * (1.0 + 0.01 * np.sin(0.7 * times) + 0.004 * np.sin(2.9 * times))
+        phase = self._phase + 2 * np.pi * np.cumsum(frequency) / RATE_HZ
+        self._phase = float(phase[-1] % (2 * np.pi))
+        tones = sum(
+            share * np.sin(k * phase[:, None] + offsets[k - 1])
+            for k, share in ((1, 1.0), (2, 0.03), (3, 0.01))
+        )
+        size = np.repeat([e.gyro_vibration, e.accel_vibration], 3) * gains
+        strength = self.activity(times) * (1.0 + 0.2 * self.rng.normal(size=len(times)))
+        return np.asarray(tones * size * strength[:, None])
+
+
+def specific_force(motion: Motion) -> Array:
+    """What an accelerometer at the frame's origin feels (M, 3): +g upwards at rest."""
+    return apply(motion.R.transpose(0, 2, 1), motion.a + GRAVITY)

@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""What every simulated lidar can do."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from bentwing.simulate.ranging import Beams
+    from bentwing.simulate.records import Record
+
+    Array = NDArray[np.float64]
+
+TRANSPORT = 0.004
+"""s, mean time from the end of a measurement to its recording."""
+
+
+@dataclass(frozen=True, slots=True)
+class LidarClock:
+    """The lidar's clock: a stamp τ belongs to the IMU's time τ − `latency`.
+
+    Attributes
+    ----------
+    latency : s
+    jitter : s, standard deviation of a message's stamp
+    """
+
+    latency: float
+    jitter: float
+
+    def stamps(self, times: Array, rng: np.random.Generator) -> Array:
+        """Stamps of messages that begin at `times` (IMU clock)."""
+        noise = rng.normal(0.0, 1.0, len(times)).clip(-3.0, 3.0)
+        return times + self.latency + self.jitter * noise
+
+
+class Lidar(Protocol):
+    """A scanner: its pattern of beams, and how it reports ranges."""
+
+    topic: str
+    noise: float
+
+    def beams(self, start: float, end: float) -> Beams | None:
+        """Beams of all sweeps that begin in [start, end), s; None if there are none."""
+        ...
+
+    def records(
+        self,
+        beams: Beams,
+        ranges: Array,
+        cosines: Array,
+        clock: LidarClock,
+        rng: np.random.Generator,
+    ) -> list[Record]:
+        """The sweeps as they are recorded."""
+        ...

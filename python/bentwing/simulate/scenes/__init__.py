@@ -1,0 +1,22 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""Scenes by name; each is built from a seed."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from bentwing.simulate.scenes.courtyard import courtyard
+from bentwing.simulate.scenes.office import office
+from bentwing.simulate.scenes.world import Site, World
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    import numpy as np
+
+__all__ = ["SCENES", "Site", "World"]
+
+SCENES: dict[str, Callable[[np.random.Generator], Site]] = {
+    "courtyard": courtyard,
+    "office": office,
+}

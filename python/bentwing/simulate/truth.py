@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""What is true, and what the estimators are told: the files beside a simulated recording."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import yaml
+
+from bentwing.simulate.imu import ImuErrors
+from bentwing.simulate.kinematics import quats_xyzw
+from bentwing.simulate.ros import to_ns
+
+if TYPE_CHECKING:
+    from pathlib import Path
+    from typing import TextIO
+
+    from numpy.typing import NDArray
+
+    from bentwing.simulate.rig import Rig
+    from bentwing.simulate.scenario import Setup
+    from bentwing.simulate.scenes.mesh import Mesh
+
+    Array = NDArray[np.float64]
+
+IMU_TOPIC, ENCODER_TOPIC = "/imu", "/encoder"
+
+
+def write_yaml(path: Path, content: dict[str, Any]) -> None:
+    """Writes a small mapping, in its own order."""
+    path.write_text(yaml.safe_dump(content, sort_keys=False, default_flow_style=None))
+
+
+def write_poses(file: TextIO, rig: Rig, times: Array) -> None:
+    """TUM lines `t x y z qx qy qz qw`: the IMU in the simulated world, at its own stamps."""
+    motion = rig.imu(times)
+    for time, p, q in zip(times, motion.p, quats_xyzw(motion.R), strict=True):
+        sec, nanosec = divmod(to_ns(float(time)), 1_000_000_000)
+        pose = " ".join(f"{value:.9f}" for value in (*p, *q))
+        file.write(f"{sec}.{nanosec:09d} {pose}\n")
+
+
+def write_ply(path: Path, mesh: Mesh) -> None:
+    """The scene as a binary PLY mesh, double precision."""
+    header = (
+        "ply\nformat binary_little_endian 1.0\n"
+        f"element vertex {len(mesh.vertices)}\n"
+        "property double x\nproperty double y\nproperty double z\n"
+        f"element face {len(mesh.triangles)}\n"
+        "property list uchar uint vertex_indices\nend_header\n"
+    )
+    faces = np.empty(len(mesh.triangles), dtype=[("n", "u1"), ("corners", "<u4", 3)])
+    faces["n"], faces["corners"] = 3, mesh.triangles
+    vertices = np.ascontiguousarray(mesh.vertices, dtype="<f8")
+    path.write_bytes(header.encode() + vertices.tobytes() + faces.tobytes())
+
+
+def payload(setup: Setup, seed: int) -> dict[str, Any]:
+    """The head as its user believes it to be."""
+    errors = ImuErrors()
+    gyro_noise, accel_noise = errors.densities()
+    imu = {
+        "topic": IMU_TOPIC,
+        "gyro_noise": round(gyro_noise, 7),
+        "accel_noise": round(accel_noise, 7),
+        "gyro_bias_walk": errors.gyro_bias_walk,
+        "accel_bias_walk": errors.accel_bias_walk,
+    }
+    head = dict(setup.rig.head.payload)
+    return {"name": f"simulated-{seed}", "lidar": head.pop("lidar"), "imu": imu, **head}
+
+
+def calibration(setup: Setup, first_biases: Array, last_biases: Array) -> dict[str, Any]:
+    """What a perfect calibration would find."""
+    biases = {
+        when: {
+            "gyro": [round(float(b), 9) for b in values[:3]],
+            "accel": [round(float(b), 9) for b in values[3:]],
+        }
+        for when, values in (("start", first_biases), ("end", last_biases))
+    }
+    # A stamp τ of the lidar belongs to the IMU's time τ − latency.
+    latency = round(setup.sensors.clock.latency, 9)
+    return {"latency": latency, **setup.rig.head.truth, "imu_biases": biases}

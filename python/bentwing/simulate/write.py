@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""The folder a simulation leaves: recording, payload and truth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from bentwing.errors import UsageError
+from bentwing.simulate.imu import RATE_HZ
+from bentwing.simulate.records import CloudRecord, EncoderRecord, ImuRecord, Record, ScanRecord
+from bentwing.simulate.ros import BagWriter
+from bentwing.simulate.stream import ticks
+from bentwing.simulate.truth import (
+    ENCODER_TOPIC,
+    IMU_TOPIC,
+    calibration,
+    payload,
+    write_ply,
+    write_poses,
+    write_yaml,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from bentwing.simulate.rig import Rig
+    from bentwing.simulate.scenario import Scenario, Setup
+
+@dataclass(frozen=True, slots=True)
+class SimulatedRecording:
+    """Where everything was written.
+
+    Attributes
+    ----------
+    recording : ROS 1 bag file or ROS 2 bag folder
+    payload : what the estimators are told about the head
+    trajectory : truth, TUM, IMU frame, IMU clock
+    scene : truth, triangle mesh
+    calibration : truth, extrinsics, latency, biases
+    scenario : what was asked for
+    """
+
+    recording: Path
+    payload: Path
+    trajectory: Path
+    scene: Path
+    calibration: Path
+    scenario: Path
+
+
+def write_recording(
+    setup: Setup, scenario: Scenario, out: Path, progress: Callable[[float], None] | None
+) -> SimulatedRecording:
+    """Streams the setup's sensors into a bag and writes the truth beside it."""
+    files = _files(out, scenario.format)
+    write_yaml(files.scenario, scenario.model_dump(mode="json"))
+    write_yaml(files.payload, payload(setup, scenario.seed))
+    write_ply(files.scene, setup.world.site.mesh)
+    biases = [setup.sensors.imu.biases.copy()]
+    with BagWriter(files.recording, scenario.format) as bag, files.trajectory.open("w") as truth:
+        for start, end, records in setup.sensors.stream(scenario.duration):
+            for record in records:
+                bag.write(*_topic_and_frame(record, setup.rig), record)
+            write_poses(truth, setup.rig, ticks(start, end, RATE_HZ))
+            if progress:
+                progress(end)
+    biases.append(setup.sensors.imu.biases.copy())
+    write_yaml(files.calibration, calibration(setup, *biases))
+    return files
+
+
+def _files(out: Path, kind: str) -> SimulatedRecording:
+    recording = out / ("recording.bag" if kind == "bag" else "recording")
+    for existing in (out / "recording.bag", out / "recording"):
+        if existing.exists():
+            msg = f"{existing} exists already: remove it or choose another output folder"
+            raise UsageError(msg)
+    out.mkdir(parents=True, exist_ok=True)
+    return SimulatedRecording(
+        recording=recording,
+        payload=out / "payload.yaml",
+        trajectory=out / "truth_trajectory.txt",
+        scene=out / "truth_scene.ply",
+        calibration=out / "truth_calibration.yaml",
+        scenario=out / "scenario.yaml",
+    )
+
+
+def _topic_and_frame(record: Record, rig: Rig) -> tuple[str, str]:
+    match record:
+        case ImuRecord():
+            return IMU_TOPIC, "imu"
+        case EncoderRecord():
+            return ENCODER_TOPIC, "motor"
+        case ScanRecord() | CloudRecord():
+            return rig.head.lidar.topic, "lidar"

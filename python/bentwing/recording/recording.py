@@ -206,7 +206,8 @@ class Recording:
         """
         begin = 0.0 if start is None else start
         end = float("inf") if duration is None else begin + duration
-        roles = [role for role in ("encoder", "imu", "lidar") if role in self._peeks]
+        order: tuple[str, ...] = ("encoder", "imu", "lidar")
+        roles = [role for role in order if role in self._peeks]
         streams = {role: self._stream(role) for role in roles}
         self._streams = streams
         by_topic = {self._peeks[role].topic.name: stream for role, stream in streams.items()}

@@ -28,12 +28,11 @@ CHECKED = 20.0  # s of the recording's beginning
 MIN_SAMPLES = 20
 MAX_RATE = 35.0  # rad/s, full scale of the fastest common gyros
 ACCEL_RANGE = (4.0, 40.0)  # m/s², median length; wide for vibration and centrifugal force
-# Unit, the range of the median length that says so, and what makes m/s² of it.
+# Unit, the range of the median length that says so, and the factor that makes m/s² of it.
 ACCEL_UNITS = (
-    ("g", (0.5, 2.0), "multiply by 9.80665"),
-    ("cm/s²", (900.0, 990.0), "multiply by 0.01"),
-    ("milli-g", (990.0, 1500.0), "multiply by 0.00980665"),
-    ("milli-g or cm/s²", (500.0, 900.0), "multiply by 0.00980665 or 0.01"),
+    ("g", (0.5, 2.0), 9.80665),
+    ("cm/s²", (700.0, 990.0), 0.01),
+    ("milli-g", (990.0, 1500.0), 0.00980665),
 )
 DEGREE = np.pi / 180
 WINDOW = 0.3  # s over which the turn of gravity and of the gyro are compared
@@ -90,17 +89,40 @@ def problems(
     return [problem for problem in found if problem is not None]
 
 
+def in_si(
+    times: NDArray[np.float64], gyro: NDArray[np.float64], accel: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return gyro in rad/s and accel in m/s², as far as their units are known."""
+    length = float(np.median(np.linalg.norm(accel, axis=1))) if len(accel) else 0.0
+    factors = [factor for _, (low, high), factor in ACCEL_UNITS if low <= length < high]
+    return gyro * gyro_scale(times, gyro, accel), accel * (factors[0] if factors else 1.0)
+
+
+def gyro_scale(
+    times: NDArray[np.float64], gyro: NDArray[np.float64], accel: NDArray[np.float64]
+) -> float:
+    """Return what makes rad/s of the gyro: 1, or π/180 where it is certainly in deg/s."""
+    if len(times) < MIN_SAMPLES:
+        return 1.0
+    is_fast = _fast_rate(gyro) > MAX_RATE
+    return DEGREE if is_fast or _GravityWindows(times, gyro, accel).explained_by(DEGREE) else 1.0
+
+
+def _fast_rate(gyro: NDArray[np.float64]) -> float:
+    return float(np.percentile(np.linalg.norm(gyro, axis=1), 99))
+
+
 def _accel_problem(accel: NDArray[np.float64]) -> str | None:
     length = float(np.median(np.linalg.norm(accel, axis=1)))
     if ACCEL_RANGE[0] <= length <= ACCEL_RANGE[1]:
         return None
     if length == 0.0:
         return "the accelerations are all zero; switch the accelerometer on in the driver"
-    for unit, (low, high), repair in ACCEL_UNITS:
+    for unit, (low, high), factor in ACCEL_UNITS:
         if low <= length < high:
             return (
                 f"the accelerations are in {unit} (median length {length:.4g}, expected 9.8 "
-                f"m/s²); {repair} to get m/s² in the driver or the recording"
+                f"m/s²); multiply by {factor:g} to get m/s² in the driver or the recording"
             )
     return (
         f"the accelerations have a median length of {length:.4g}, expected 9.8 m/s²; check the "
@@ -111,7 +133,7 @@ def _accel_problem(accel: NDArray[np.float64]) -> str | None:
 def _gyro_problem(
     times: NDArray[np.float64], gyro: NDArray[np.float64], accel: NDArray[np.float64]
 ) -> str | None:
-    fast = float(np.percentile(np.linalg.norm(gyro, axis=1), 99))
+    fast = _fast_rate(gyro)
     repair = "multiply by 0.0174533 to get rad/s in the driver or the recording"
     if fast > MAX_RATE:
         return (

@@ -17,7 +17,7 @@ from bentwing.recording.slots import group_into_slots, trimmed
 from bentwing.recording.source import open_source
 from bentwing.recording.stream_warnings import stream_warnings
 from bentwing.recording.streams import EncoderStream, ImuStream
-from bentwing.recording.topics import resolve
+from bentwing.recording.topics import LASER_SCAN, MULTI_ECHO, resolve
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -86,36 +86,51 @@ class Recording:
 
     def _check_fitness(self) -> None:
         if "imu" in self._peeks and not self.payload.places_lidar_on_imu:
-            msg = (
-                f"the recording has an IMU ({self.imu_topic}), but the payload does not say where "
-                "the lidar is on it: give T_imu_lidar (translation in m, quaternion x y z w), or "
-                "'imu: null' to map with the lidar alone"
-            )
-            raise PayloadError(msg)
+            raise PayloadError(self.mount_problem())
         if self.point_times is None:
-            msg = (
-                f"{self.lidar_topic}: no time per point (LaserScan: time_increment 0; PointCloud2: "
-                "no field t, time or timestamp that varies), so a moving scan cannot be "
-                "undistorted; switch it on in the lidar's driver and record again"
-            )
-            raise RecordingError(msg)
-        self._check_clocks()
+            raise RecordingError(self.point_time_problem())
+        for problem in self.clock_problems():
+            raise RecordingError(problem)
         if "imu" in self._peeks:
             imu_units.check(self.imu_topic or "", self._first_imu_batches())
 
-    def _check_clocks(self) -> None:
+    def mount_problem(self) -> str:
+        """Return the sentence on an IMU whose place relative to the lidar is not known."""
+        return (
+            f"the recording has an IMU ({self.imu_topic}), but the payload does not say where "
+            "the lidar is on it: give T_imu_lidar (translation in m, quaternion x y z w), or "
+            "'imu: null' to map with the lidar alone"
+        )
+
+    def point_time_problem(self) -> str:
+        """Return the sentence on a lidar that does not tell when each point was measured."""
+        if self.lidar_type in (LASER_SCAN, MULTI_ECHO):
+            return (
+                f"{self.lidar_topic}: no time per beam (time_increment is 0), so a moving scan "
+                "cannot be undistorted; set time_increment (time per turn / beams per turn) in the "
+                "lidar's driver and record again"
+            )
+        return (
+            f"{self.lidar_topic}: no time per point (no field t, time or timestamp that varies "
+            "within a cloud), so a moving sweep cannot be undistorted; switch it on in the lidar's "
+            "driver and record again"
+        )
+
+    def clock_problems(self) -> list[str]:
+        """Return a sentence for each sensor that does not share the lidar's clock."""
         lidar = self._peeks["lidar"]
+        problems = []
         for role in ("imu", "encoder"):
             if (other := self._peeks.get(role)) is None:
                 continue
             difference = (other.offset_ns - lidar.offset_ns) / NS_PER_S
             if abs(difference) > MAX_CLOCK_OFFSET:
-                msg = (
+                problems.append(
                     f"{other.topic.name} and {lidar.topic.name} are stamped by clocks "
                     f"{difference:+.1f} s apart; let both drivers stamp with the host's clock, or "
                     "synchronize them, and record again"
                 )
-                raise RecordingError(msg)
+        return problems
 
     def _first_imu_batches(self) -> Iterator[Batch]:
         """Yield the IMU's samples alone, in a pass of their own that leaves the counts as is."""
@@ -177,6 +192,22 @@ class Recording:
     def duration(self) -> float:
         """Seconds from start to end."""
         return (self.end_ns - self.start_ns) / NS_PER_S
+
+    @property
+    def gaps(self) -> dict[str, list[tuple[float, float]]]:
+        """Silences by topic as (start, length) in s; complete after a pass over `batches`."""
+        return {
+            self._peeks[role].topic.name: [
+                ((gap.start_ns - self.start_ns) / NS_PER_S, (gap.end_ns - gap.start_ns) / NS_PER_S)
+                for gap in stream.monitor.gaps
+            ]
+            for role, stream in self._streams.items()
+        }
+
+    @property
+    def lidar_type(self) -> str:
+        """The type of the lidar's topic, e.g. sensor_msgs/msg/LaserScan."""
+        return self._peeks["lidar"].topic.type
 
     @property
     def warnings(self) -> list[str]:

@@ -41,36 +41,39 @@ def scan_mcap(file: BinaryIO) -> Iterator[ScannedMessage | ScanEnd]:
     directory = _Directory()
     while True:
         try:
-            operation, content = _read_record(file)
+            operation, content, is_whole = _read_record(file)
             if operation in (OP_FOOTER, OP_DATA_END):
                 yield ScanEnd(None)
                 return
-            messages = _messages_of(operation, content, directory)
-        except EOFError:
-            yield ScanEnd(f"cut off at byte {file.tell()}")
-            return
+            messages = _messages_of(operation, content, directory, is_whole=is_whole)
         # A damaged chunk fails in its decompressor, which promises no particular exception.
         except Exception as error:
             yield ScanEnd(f"damaged before byte {file.tell()} ({error})")
             return
         yield from sorted(messages, key=lambda message: message.stamp_ns)
+        if not is_whole:
+            yield ScanEnd(f"cut off at byte {file.tell()}")
+            return
 
 
-def _read_record(file: BinaryIO) -> tuple[int, bytes]:
+def _read_record(file: BinaryIO) -> tuple[int, bytes, bool]:
+    """Return opcode, content, and whether the content is all there."""
     head = file.read(9)
     if len(head) < 9:
-        raise EOFError
+        return OP_CHUNK, b"", False
     (size,) = struct.unpack_from("<Q", head, 1)
     if size > MAX_INFLATION:
         msg = f"record of {size} bytes"
         raise ValueError(msg)
     content = file.read(size)
-    if len(content) < size:
-        raise EOFError
-    return head[0], content
+    return head[0], content, len(content) == size
 
 
-def _messages_of(operation: int, content: bytes, directory: _Directory) -> list[ScannedMessage]:
+def _messages_of(
+    operation: int, content: bytes, directory: _Directory, *, is_whole: bool = True
+) -> list[ScannedMessage]:
+    if not is_whole:
+        return _messages_in_cut_chunk(operation, content, directory)
     if operation == OP_SCHEMA:
         (identity,) = struct.unpack_from("<H", content)
         directory.schemas[identity] = _string(content, 2)[0]
@@ -83,6 +86,15 @@ def _messages_of(operation: int, content: bytes, directory: _Directory) -> list[
     elif operation == OP_CHUNK:
         return _messages_in_chunk(_decompressed(content), directory)
     return []
+
+
+def _messages_in_cut_chunk(
+    operation: int, content: bytes, directory: _Directory
+) -> list[ScannedMessage]:
+    """Return what is left of the last record: only uncompressed chunks can be read in part."""
+    if operation != OP_CHUNK or len(content) < 40 or _string(content, 28)[0]:
+        return []
+    return _messages_in_chunk(content[40:], directory)
 
 
 def _decompressed(content: bytes) -> bytes:

@@ -52,7 +52,8 @@ class RosbagsSource:
     """An intact file or folder, read through rosbags' index."""
 
     def __init__(self, path: Path) -> None:
-        self.cdr = path.suffix != ".bag"
+        # A ROS 2 folder may well be called something.bag.
+        self.cdr = path.is_dir() or path.suffix != ".bag"
         self._path = path
         self._reader = Rosbag2Reader(path) if self.cdr else Rosbag1Reader(path)
         self._reader.open()

@@ -7,7 +7,7 @@ import pytest
 from bentwing.recording import imu_units
 
 G = 9.80665
-RATE_HZ = 200
+RATE_HZ = 100
 
 
 def moving_imu(rates, seconds=10.0, seed=0):

@@ -15,7 +15,9 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 
-LIVOX_POINT = "uint32 offset_time\nfloat32 x\nfloat32 y\nfloat32 z\nuint8 reflectivity\nuint8 tag\nuint8 line"
+LIVOX_POINT = (
+    "uint32 offset_time\nfloat32 x\nfloat32 y\nfloat32 z\nuint8 reflectivity\nuint8 tag\nuint8 line"
+)
 LIVOX_MSG = (
     "std_msgs/Header header\nuint64 timebase\nuint32 point_num\nuint8 lidar_id\nuint8[3] rsvd\n"
     "livox_ros_driver2/CustomPoint[] points"

@@ -56,6 +56,6 @@ def test_any_file_is_a_payload_or_a_payload_error(tmp_path, content):
     path = tmp_path / "payload.yaml"
     path.write_bytes(content)
     try:
-        Payload.load(path)
-    except PayloadError as error:
-        assert str(path) in str(error)
+        assert isinstance(Payload.load(path), Payload)
+    except PayloadError:
+        return

@@ -10,7 +10,7 @@ import numpy as np
 
 from bentwing.inspection.planar import level_share
 from bentwing.preprocess import find_static_start
-from bentwing.recording import imu_units
+from bentwing.recording import imu_units, problems
 from bentwing.recording.topics import LASER_SCAN, MULTI_ECHO
 
 if TYPE_CHECKING:
@@ -105,7 +105,11 @@ def _start_warnings(static: Stretch | None) -> list[str]:
 
 
 def _time_defects(recording: Recording) -> list[str]:
-    return [] if recording.point_times else [recording.point_time_problem()]
+    return (
+        []
+        if recording.point_times
+        else [problems.point_times(recording.lidar_topic, recording.lidar_type)]
+    )
 
 
 def _mirrored(recording: Recording, samples: Samples, gyro: NDArray[np.float64]) -> list[str]:
@@ -156,7 +160,7 @@ def _planar_defects(recording: Recording, samples: Samples) -> list[str]:
 def _mount_defects(recording: Recording, *, has_payload: bool) -> list[str]:
     if recording.imu_topic is None or recording.payload.places_lidar_on_imu or not has_payload:
         return []
-    return [recording.mount_problem()]
+    return [problems.mount(recording.imu_topic)]
 
 
 def _R_imu_lidar(recording: Recording) -> NDArray[np.float64]:

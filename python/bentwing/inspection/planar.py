@@ -15,7 +15,8 @@ if TYPE_CHECKING:
 
 N_BEAMS = 360  # azimuth bins of 1°
 MAX_SHIFT = 30  # bins between consecutive scans
-MAX_SCANS = 1500
+MAX_DIFFERENCE = 0.3  # m
+MAX_SCANS = 1000
 MIN_TURN = 0.03  # rad between scans, below which the bins do not resolve a turn
 MIN_TURNS = 10
 MIN_CORRELATION = 0.7
@@ -99,6 +100,7 @@ def _turn(before: NDArray[np.float64], after: NDArray[np.float64]) -> float:
     is_seen = np.isfinite(differences)
     if is_seen.sum(axis=1).min() < N_BEAMS // 4:
         return float("nan")
-    # The median ignores what moves and what comes into view.
-    costs = np.nanmedian(differences, axis=1)
+    # Clipping bounds the weight of what moves and of what comes into view.
+    costs = np.where(is_seen, np.minimum(differences, MAX_DIFFERENCE), 0.0).sum(axis=1)
+    costs /= is_seen.sum(axis=1)
     return float(np.radians(shifts[int(np.argmin(costs))]))

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from bentwing.recording.wire import RawScan
+    from bentwing.recording.wire_scans import RawScan
 
 MAX_SWEEP = 10.0  # s; a longer scan is a damaged time_increment
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bentwing.errors import RecordingError
-from bentwing.recording import laser_scan, point_cloud2, wire
+from bentwing.recording import laser_scan, point_cloud2, problems, wire, wire_clouds, wire_scans
 from bentwing.recording.batches import LidarBatch
 from bentwing.recording.stamps import StampMonitor
 from bentwing.recording.sweeps import SweepMerger
@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     from bentwing.recording.clock import Clock
     from bentwing.recording.point_times import TimeReading
     from bentwing.recording.streams import RawMessage
-    from bentwing.recording.wire import RawLivox, RawScan
+    from bentwing.recording.wire_clouds import RawLivox
+    from bentwing.recording.wire_scans import RawScan
 
 MAX_LIVOX_OFFSET_NS = 1_000_000_000
 
@@ -53,12 +54,13 @@ class LidarStream:
         self.counts: Counter[str] = Counter()
         self.monitor = StampMonitor(topic, use_recorder_time=use_recorder_time, counts=self.counts)
         self.n_points = 0
-        self._topic, self._clock, self._cdr = topic, clock, cdr
+        self._topic, self._kind = topic, kind
+        self._clock, self._cdr = clock, cdr
         self._reading, self._needs_beam_times = reading, needs_beam_times
         self._merger = SweepMerger(self.counts)
         decoders: Mapping[str, Callable[[Sequence[RawMessage]], list[LidarBatch]]] = {
-            LASER_SCAN: lambda messages: self._scans(messages, wire.laser_scan),
-            MULTI_ECHO: lambda messages: self._scans(messages, wire.multi_echo_scan),
+            LASER_SCAN: lambda messages: self._scans(messages, wire_scans.laser_scan),
+            MULTI_ECHO: lambda messages: self._scans(messages, wire_scans.multi_echo_scan),
             POINT_CLOUD: self._clouds,
         } | dict.fromkeys(LIVOX, self._livox)
         self._decode = decoders[kind]
@@ -88,7 +90,7 @@ class LidarStream:
                 self.counts["broken_messages"] += 1
                 continue
             if self._needs_beam_times and not laser_scan.has_beam_times(scan):
-                self._refuse_scan()
+                raise RecordingError(problems.point_times(self._topic, self._kind))
             stamp_ns = self.monitor.accept(scan.stamp_ns, recorder_ns)
             if stamp_ns is not None:
                 scans.append(scan)
@@ -101,7 +103,7 @@ class LidarStream:
         sweeps = []
         for recorder_ns, raw in messages:
             try:
-                cloud = wire.point_cloud(raw, cdr=self._cdr)
+                cloud = wire_clouds.point_cloud(raw, cdr=self._cdr)
                 columns = point_cloud2.columns(cloud, self.counts)
             except wire.BrokenMessageError:
                 self.counts["broken_messages"] += 1
@@ -121,7 +123,7 @@ class LidarStream:
         sweeps = []
         for recorder_ns, raw in messages:
             try:
-                message = wire.livox_custom(raw, cdr=self._cdr)
+                message = wire_clouds.livox_custom(raw, cdr=self._cdr)
             except wire.BrokenMessageError:
                 self.counts["broken_messages"] += 1
                 continue
@@ -148,11 +150,3 @@ class LidarStream:
 
     def _seconds(self, stamp_ns: int) -> float:
         return float(self._clock.to_seconds(np.array([stamp_ns], dtype=np.int64))[0])
-
-    def _refuse_scan(self) -> None:
-        msg = (
-            f"{self._topic}: time_increment is 0, so the time of each beam is unknown and a moving "
-            "scan cannot be undistorted; set time_increment (scan time / beams per turn) in the "
-            "lidar's driver and record again"
-        )
-        raise RecordingError(msg)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bentwing.errors import RecordingError
-from bentwing.recording import laser_scan, point_cloud2, point_times, wire
+from bentwing.recording import laser_scan, point_cloud2, point_times, wire, wire_clouds, wire_scans
 from bentwing.recording.topics import LASER_SCAN, LIVOX, MULTI_ECHO, POINT_CLOUD
 
 if TYPE_CHECKING:
@@ -90,7 +90,7 @@ def _point_times(
 
 
 def _beam_times(topic: TopicInfo, messages: list[bytes], *, cdr: bool) -> str | None:
-    parse = wire.laser_scan if topic.type == LASER_SCAN else wire.multi_echo_scan
+    parse = wire_scans.laser_scan if topic.type == LASER_SCAN else wire_scans.multi_echo_scan
     for raw in messages:
         try:
             scan = parse(raw, cdr=cdr)
@@ -109,7 +109,7 @@ def _cloud_times(messages: list[bytes], stamps_ns: list[int], *, cdr: bool) -> T
     period = float(np.median(steps)) * 1e-9 if len(steps) and np.median(steps) > 0 else None
     for raw in reversed(messages):
         try:
-            cloud = wire.point_cloud(raw, cdr=cdr)
+            cloud = wire_clouds.point_cloud(raw, cdr=cdr)
             columns = point_cloud2.columns(cloud, Counter())
         except wire.BrokenMessageError:
             continue

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bentwing.recording.point_times import TimeReading
-    from bentwing.recording.wire import RawCloud, RawField
+    from bentwing.recording.wire_clouds import RawCloud, RawField
 
 DATATYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
 INTENSITY_NAMES = ("intensity", "intensities", "reflectivity", "signal")

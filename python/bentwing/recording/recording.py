@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bentwing.errors import PayloadError, RecordingError
-from bentwing.recording import imu_units
+from bentwing.recording import imu_units, problems
 from bentwing.recording.clock import NS_PER_S, Clock
 from bentwing.recording.lidar_stream import LidarStream
 from bentwing.recording.payload import Payload
@@ -17,7 +17,7 @@ from bentwing.recording.slots import group_into_slots, trimmed
 from bentwing.recording.source import open_source
 from bentwing.recording.stream_warnings import stream_warnings
 from bentwing.recording.streams import EncoderStream, ImuStream
-from bentwing.recording.topics import LASER_SCAN, MULTI_ECHO, resolve
+from bentwing.recording.topics import resolve
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from bentwing.recording.scanned import TopicInfo
     from bentwing.recording.streams import Stream
 
-MAX_CLOCK_OFFSET = 10.0  # s between the sensors' clocks; more and they do not share one
 SEEK_MARGIN = 5.0  # s by which messages may reach the recorder late
 
 
@@ -47,10 +46,6 @@ class Recording:
     ------
     RecordingError, PayloadError
         The recording cannot be read, or does not match the payload.
-
-    Attributes
-    ----------
-    counts : of the latest pass over `batches`, by `<stream>.<reason>`
     """
 
     def __init__(
@@ -64,7 +59,6 @@ class Recording:
         self.paths = [Path(path) for path in listed]
         self.payload = payload or Payload.default()
         self.strict = strict
-        self.counts: Counter[str] = Counter()
         self._source = open_source(self.paths)
         self._streams: dict[str, Stream] = {}
         try:
@@ -86,51 +80,20 @@ class Recording:
 
     def _check_fitness(self) -> None:
         if "imu" in self._peeks and not self.payload.places_lidar_on_imu:
-            raise PayloadError(self.mount_problem())
+            raise PayloadError(problems.mount(self.imu_topic or ""))
         if self.point_times is None:
-            raise RecordingError(self.point_time_problem())
+            raise RecordingError(problems.point_times(self.lidar_topic, self.lidar_type))
         for problem in self.clock_problems():
             raise RecordingError(problem)
         if "imu" in self._peeks:
             imu_units.check(self.imu_topic or "", self._first_imu_batches())
 
-    def mount_problem(self) -> str:
-        """Return the sentence on an IMU whose place relative to the lidar is not known."""
-        return (
-            f"the recording has an IMU ({self.imu_topic}), but the payload does not say where "
-            "the lidar is on it: give T_imu_lidar (translation in m, quaternion x y z w), or "
-            "'imu: null' to map with the lidar alone"
-        )
-
-    def point_time_problem(self) -> str:
-        """Return the sentence on a lidar that does not tell when each point was measured."""
-        if self.lidar_type in (LASER_SCAN, MULTI_ECHO):
-            return (
-                f"{self.lidar_topic}: no time per beam (time_increment is 0), so a moving scan "
-                "cannot be undistorted; set time_increment (time per turn / beams per turn) in the "
-                "lidar's driver and record again"
-            )
-        return (
-            f"{self.lidar_topic}: no time per point (no field t, time or timestamp that varies "
-            "within a cloud), so a moving sweep cannot be undistorted; switch it on in the lidar's "
-            "driver and record again"
-        )
-
     def clock_problems(self) -> list[str]:
         """Return a sentence for each sensor that does not share the lidar's clock."""
         lidar = self._peeks["lidar"]
-        problems = []
-        for role in ("imu", "encoder"):
-            if (other := self._peeks.get(role)) is None:
-                continue
-            difference = (other.offset_ns - lidar.offset_ns) / NS_PER_S
-            if abs(difference) > MAX_CLOCK_OFFSET:
-                problems.append(
-                    f"{other.topic.name} and {lidar.topic.name} are stamped by clocks "
-                    f"{difference:+.1f} s apart; let both drivers stamp with the host's clock, or "
-                    "synchronize them, and record again"
-                )
-        return problems
+        others = [self._peeks[role] for role in ("imu", "encoder") if role in self._peeks]
+        found = [problems.clocks(lidar, other) for other in others]
+        return [problem for problem in found if problem is not None]
 
     def _first_imu_batches(self) -> Iterator[Batch]:
         """Yield the IMU's samples alone, in a pass of their own that leaves the counts as is."""
@@ -194,6 +157,18 @@ class Recording:
         return (self.end_ns - self.start_ns) / NS_PER_S
 
     @property
+    def counts(self) -> Counter[str]:
+        """What the latest pass over `batches` read and dropped so far, by `<stream>.<reason>`."""
+        return Counter(
+            {
+                f"{role}.{name}": n
+                for role, stream in self._streams.items()
+                for name, n in stream.counts.items()
+                if n
+            }
+        )
+
+    @property
     def gaps(self) -> dict[str, list[tuple[float, float]]]:
         """Silences by topic as (start, length) in s; complete after a pass over `batches`."""
         return {
@@ -213,6 +188,12 @@ class Recording:
     def warnings(self) -> list[str]:
         """What was found odd so far, as sentences; complete after a pass over `batches`."""
         sentences = list(self._source.warnings)
+        gnss = self.payload.gnss
+        if gnss is not None and gnss.topic not in {topic.name for topic in self.topics}:
+            sentences.append(
+                f"the payload names the gnss topic {gnss.topic}, which the recording does not have; "
+                "the map stays in its own frame"
+            )
         for role, found in self._peeks.items():
             if found.use_recorder_time:
                 sentences.append(
@@ -248,14 +229,6 @@ class Recording:
             if (part := trimmed(batch, begin, end)) is not None:
                 n_points += hasattr(part, "points")
                 yield part
-        self.counts = Counter(
-            {
-                f"{role}.{name}": n
-                for role, stream in streams.items()
-                for name, n in stream.counts.items()
-                if n
-            }
-        )
         if self.strict and n_points == 0:
             self._refuse_empty(begin, end)
 

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 
 NS_PER_S = 1_000_000_000
 MAX_OFFSET_STEP_NS = 10 * NS_PER_S  # header against recorder; less is transport delay
+MAX_UNCONFIRMED_NS = NS_PER_S  # a larger step ahead of the recorder has to be confirmed
 MAX_JUMPS = 50  # consecutive messages; more is a clock that was set, not a damaged stamp
 MIN_GAP_NS = NS_PER_S // 2
 GAP_PERIODS = 5
@@ -43,6 +44,7 @@ class StampMonitor:
         self._last_offset_ns = 0
         self._n_jumps = 0
         self._period_ns = 0.0
+        self._suspect: tuple[int, int] | None = None
 
     def accept(self, header_ns: int, recorder_ns: int) -> int | None:
         """Return the stamp to use in ns, or None for a message to drop."""
@@ -52,7 +54,10 @@ class StampMonitor:
             self._take(stamp_ns, offset_ns)
             return stamp_ns
         if abs(offset_ns - self._last_offset_ns) > MAX_OFFSET_STEP_NS:
-            self._reject_jump(stamp_ns)
+            self._reject_jump(offset_ns)
+            return None
+        if self._is_unconfirmed(stamp_ns, offset_ns):
+            self._counts["stamp_jumps"] += 1
             return None
         step_ns = stamp_ns - self._last_ns
         if step_ns <= 0:
@@ -66,12 +71,25 @@ class StampMonitor:
 
     def _take(self, stamp_ns: int, offset_ns: int) -> None:
         self._last_ns, self._last_offset_ns, self._n_jumps = stamp_ns, offset_ns, 0
+        self._suspect = None
 
-    def _reject_jump(self, stamp_ns: int) -> None:
+    def _is_unconfirmed(self, stamp_ns: int, offset_ns: int) -> bool:
+        """Whether a stamp runs ahead of the recorder's clock and no message before it did so too.
+
+        Taking a single damaged stamp would make all the good ones after it go backwards.
+        """
+        if offset_ns - self._last_offset_ns <= MAX_UNCONFIRMED_NS:
+            return False
+        before, self._suspect = self._suspect, (stamp_ns, offset_ns)
+        if before is None:
+            return True
+        return stamp_ns <= before[0] or abs(offset_ns - before[1]) > MAX_UNCONFIRMED_NS
+
+    def _reject_jump(self, offset_ns: int) -> None:
         self._counts["stamp_jumps"] += 1
         self._n_jumps += 1
         if self._n_jumps > MAX_JUMPS:
-            step = (stamp_ns - (self._last_ns or 0)) / NS_PER_S
+            step = (offset_ns - self._last_offset_ns) / NS_PER_S
             msg = (
                 f"{self._topic}: the header stamps step by {step:+.1f} s and stay there, the clock "
                 "was set during the recording; map the part before or after it with --start and "

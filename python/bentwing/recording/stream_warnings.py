@@ -16,7 +16,7 @@ REASONS = {
     "broken_messages": "{n} messages could not be read and were left out; the file is damaged there",
     "duplicate_stamps": "{n} messages repeat the stamp before them and were left out; check the "
     "driver's time stamps",
-    "stamp_jumps": "{n} messages have stamps more than 10 s off and were left out",
+    "stamp_jumps": "{n} messages have stamps that jump and were left out",
     "bad_point_time": "{n} points have a time more than a second from their message and were left "
     "out",
     "late_points": "{n} points are earlier than the sweep before them and were left out",

@@ -46,10 +46,10 @@ class ImuStream:
 
     def decode(self, messages: Sequence[RawMessage]) -> ImuBatch | None:
         """Return the samples of the next messages."""
-        stamps_ns, bodies, order = [], [], "<"
+        stamps_ns, bodies = [], []
         for recorder_ns, raw in messages:
             try:
-                header_ns, body, order = wire.imu(raw, cdr=self._cdr)
+                header_ns, body = wire.imu(raw, cdr=self._cdr)
             except wire.BrokenMessageError:
                 self.counts["broken_messages"] += 1
                 continue
@@ -58,7 +58,7 @@ class ImuStream:
                 stamps_ns.append(stamp_ns)
                 bodies.append(body)
         self.counts["samples"] += len(stamps_ns)
-        values = np.frombuffer(b"".join(bodies), f"{order}f8").reshape(-1, 37).astype(np.float64)
+        values = np.frombuffer(b"".join(bodies), "<f8").reshape(-1, 37).astype(np.float64)
         gyro, accel = values[:, 13:16], values[:, 25:28]
         keep = self._usable(gyro, accel)
         if not keep.any():

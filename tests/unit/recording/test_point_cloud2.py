@@ -7,7 +7,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from bentwing.recording import point_times, wire
+from bentwing.recording import point_times, wire, wire_clouds
 from bentwing.recording.point_cloud2 import columns, sweep, time_field
 
 STAMP_NS = 1_700_000_000_250_000_000
@@ -37,7 +37,7 @@ def table_of(dtype, n=50):
 
 
 def cloud_of(ros1, table, **layout):
-    return wire.point_cloud(ros1.serialize(ros1.cloud(0.25, table, **layout)), cdr=False)
+    return wire_clouds.point_cloud(ros1.serialize(ros1.cloud(0.25, table, **layout)), cdr=False)
 
 
 @pytest.mark.parametrize("dtype", LAYOUTS.values(), ids=LAYOUTS)
@@ -124,7 +124,7 @@ def test_thirty_thousand_points_take_less_than_ten_milliseconds(ros1):
 
     def once():
         start = time.process_time()
-        cols = columns(wire.point_cloud(raw, cdr=False), Counter())
+        cols = columns(wire_clouds.point_cloud(raw, cdr=False), Counter())
         sweep(cols, reading, STAMP_NS, 1.0, Counter())
         return time.process_time() - start
 

@@ -192,9 +192,7 @@ def test_a_clock_set_while_recording_is_refused(tmp_path, ros1):
 
 
 def test_overlapping_sweeps_lose_no_point(tmp_path, ros1):
-    entries = [
-        ("/scan", t, ros1.scan(t, time_increment=0.0011)) for t in np.arange(0, 1, 0.1)
-    ]
+    entries = [("/scan", t, ros1.scan(t, time_increment=0.0011)) for t in np.arange(0, 1, 0.1)]
     (lidar, _, _), _ = read(ros1.write(tmp_path / "a.bag", entries), NO_IMU)
     times = joined(lidar, "times")
     assert len(times) == 1000

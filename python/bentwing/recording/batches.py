@@ -21,12 +21,26 @@ class LidarBatch:
     times : (N,) float64, s since the recording's start, non-decreasing, lidar clock
     intensity : (N,) float32 or None, as the sensor reports it
     ring : (N,) uint16 or None, beam number of a multi-beam lidar
+    angles : (N,) float64 or None, rad, angle of the motor that turns the lidar at each point's
+        time, unwrapped; set by preprocess
     """
 
     points: NDArray[np.float64]
     times: NDArray[np.float64]
     intensity: NDArray[np.float32] | None = None
     ring: NDArray[np.uint16] | None = None
+    angles: NDArray[np.float64] | None = None
+
+    def where(self, keep: NDArray[np.bool_] | NDArray[np.intp] | slice) -> LidarBatch:
+        """Return the returns selected by a mask, by indices or by a slice."""
+        intensity, ring, angles = self.intensity, self.ring, self.angles
+        return LidarBatch(
+            self.points[keep],
+            self.times[keep],
+            None if intensity is None else intensity[keep],
+            None if ring is None else ring[keep],
+            None if angles is None else angles[keep],
+        )
 
 
 @dataclass(frozen=True, slots=True)

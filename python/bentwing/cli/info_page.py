@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""The page that `bentwing info` prints."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rich.markup import escape
+from rich.table import Table
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from rich.console import RenderableType
+
+    from bentwing.inspection import Inspection
+    from bentwing.inspection.inspect import TopicReport
+    from bentwing.inspection.spin import Spin
+
+BARS = "▁▂▃▄▅▆▇█"
+SPARKLINE_WIDTH = 60
+MAX_GAPS = 3
+
+
+def page(inspection: Inspection) -> Iterator[RenderableType]:
+    """Yield the parts of the page, top to bottom."""
+    yield f"[bold]{escape(', '.join(inspection.paths))}[/bold]  {inspection.duration:.1f} s"
+    yield _topics(inspection.topics)
+    yield from _sensors(inspection)
+    yield from (f"[yellow]warning[/yellow]  {escape(text)}" for text in inspection.warnings)
+    yield from (f"[red]defect[/red]   {escape(text)}" for text in inspection.defects)
+    if inspection.is_fit:
+        yield "[green]fit for mapping[/green]"
+    else:
+        yield f"[red]not fit for mapping[/red]: {len(inspection.defects)} defect(s), see above"
+
+
+def _topics(topics: list[TopicReport]) -> Table:
+    table = Table("topic", "type", "used as", box=None)
+    for heading in ("messages", "Hz"):
+        table.add_column(heading, justify="right")
+    table.add_column("gaps")
+    for topic in topics:
+        table.add_row(
+            escape(topic.name),
+            escape(topic.type),
+            topic.role,
+            str(topic.count),
+            f"{topic.rate_hz:.1f}",
+            _gaps(topic.gaps),
+        )
+    return table
+
+
+def _gaps(gaps: list[tuple[float, float]]) -> str:
+    longest = sorted(gaps, key=lambda gap: -gap[1])[:MAX_GAPS]
+    text = ", ".join(f"{length:.1f} s at {start:.1f} s" for start, length in longest)
+    return text + (f" and {len(gaps) - MAX_GAPS} more" if len(gaps) > MAX_GAPS else "")
+
+
+def _sensors(inspection: Inspection) -> Iterator[str]:
+    if inspection.point_times is not None:
+        yield f"times      {escape(inspection.point_times)}"
+    if inspection.spin is not None:
+        yield from _spin(inspection.spin)
+    if inspection.static_start is not None:
+        start, end = inspection.static_start
+        yield f"start      static from {start:.1f} to {end:.1f} s"
+    structure = inspection.structure
+    if structure is not None and structure.n_points:
+        low, _, middle, _, high = structure.range_percentiles
+        yield (
+            f"structure  {structure.n_points} returns, {structure.valid_share:.0%} of the beams; "
+            f"ranges {low:.1f} to {high:.1f} m (5 to 95 %), median {middle:.1f} m; "
+            f"{structure.far_share:.0%} beyond 20 m"
+        )
+
+
+def _spin(spin: Spin) -> Iterator[str]:
+    if not spin.rates:
+        return
+    usual = f"{spin.usual:.2f} rad/s" if spin.usual else "no steady spin"
+    yield f"turning    {usual} ({spin.source}), at most {max(spin.rates):.2f} rad/s"
+    yield f"           {_sparkline(spin.rates)}"
+
+
+def _sparkline(values: list[float]) -> str:
+    step = max(1, -(-len(values) // SPARKLINE_WIDTH))
+    means = [
+        sum(values[i : i + step]) / len(values[i : i + step]) for i in range(0, len(values), step)
+    ]
+    top = max(max(means), 1e-9)
+    return "".join(BARS[min(len(BARS) - 1, int(mean / top * len(BARS)))] for mean in means)

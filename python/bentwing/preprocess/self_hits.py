@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""Leave out returns from the carrier itself."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from numpy.typing import NDArray
+
+    from bentwing.recording.payload import SelfHit
+
+
+def outside_boxes(points: NDArray[np.float64], self_hits: Iterable[SelfHit]) -> NDArray[np.bool_]:
+    """Return which points lie in none of the payload's self-hit boxes.
+
+    Parameters
+    ----------
+    points : (N, 3) float64, m, lidar frame
+    self_hits : boxes in the lidar frame; their faces belong to them
+
+    Returns
+    -------
+    (N,) bool
+    """
+    outside = np.ones(len(points), dtype=np.bool_)
+    for region in self_hits:
+        inside = (points >= region.box.min) & (points <= region.box.max)
+        outside &= ~inside.all(axis=1)
+    return outside

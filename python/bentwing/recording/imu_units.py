@@ -1,0 +1,208 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""Tell from its samples whether an IMU reports m/s² and rad/s on right-handed axes.
+
+The accelerometer's unit shows in the length of its median. The gyro's is harder: a payload may
+well turn at 6 or even 20 rad/s. Two things are certain: no common gyro measures beyond 35 rad/s
+(2000 °/s), and while the head tilts, the direction of gravity turns in the IMU's frame as the
+integrated gyro says, in one unit and with one set of signs only.
+"""
+
+from __future__ import annotations
+
+import itertools
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bentwing.errors import RecordingError
+from bentwing.recording.batches import ImuBatch
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from numpy.typing import NDArray
+
+    from bentwing.recording.batches import Batch
+
+CHECKED = 20.0  # s of the recording's beginning
+MIN_SAMPLES = 20
+MAX_RATE = 35.0  # rad/s, full scale of the fastest common gyros
+ACCEL_RANGE = (4.0, 40.0)  # m/s², median length; wide for vibration and centrifugal force
+# Unit, the range of the median length that says so, and the factor that makes m/s² of it.
+ACCEL_UNITS = (
+    ("g", (0.5, 2.0), 9.80665),
+    ("cm/s²", (700.0, 990.0), 0.01),
+    ("milli-g", (990.0, 1500.0), 0.00980665),
+)
+DEGREE = np.pi / 180
+WINDOW = 0.3  # s over which the turn of gravity and of the gyro are compared
+# A reading is believed where it explains half of gravity's turning and four times better than
+# the samples as they are.
+EXPLAINS, BETTER = 0.5, 0.25
+
+
+def check(topic: str, batches: Iterable[Batch]) -> None:
+    """Refuse an IMU in wrong units or with mirrored axes, from the beginning of its samples.
+
+    Raises
+    ------
+    RecordingError
+        All that is wrong, with how to repair it.
+    """
+    found = problems(*collect(batches))
+    if found:
+        msg = f"{topic}: {'; '.join(found)}"
+        raise RecordingError(msg)
+
+
+def collect(
+    batches: Iterable[Batch], seconds: float = CHECKED
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return times (M,), gyro (M, 3) and accel (M, 3) of the first seconds."""
+    parts: list[ImuBatch] = []
+    for batch in batches:
+        if isinstance(batch, ImuBatch):
+            parts.append(batch)
+            if batch.times[-1] - parts[0].times[0] >= seconds:
+                break
+    if not parts:
+        return np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3))
+    return (
+        np.concatenate([part.times for part in parts]),
+        np.concatenate([part.gyro for part in parts]),
+        np.concatenate([part.accel for part in parts]),
+    )
+
+
+def problems(
+    times: NDArray[np.float64], gyro: NDArray[np.float64], accel: NDArray[np.float64]
+) -> list[str]:
+    """Return what is certainly wrong, each with what to do.
+
+    Parameters
+    ----------
+    times : (M,) s; gyro : (M, 3); accel : (M, 3), in whatever unit they are
+    """
+    if len(times) < MIN_SAMPLES:
+        return []
+    found = [_accel_problem(accel), _gyro_problem(times, gyro, accel)]
+    return [problem for problem in found if problem is not None]
+
+
+def in_si(
+    times: NDArray[np.float64], gyro: NDArray[np.float64], accel: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return gyro in rad/s and accel in m/s², as far as their units are known."""
+    length = float(np.median(np.linalg.norm(accel, axis=1))) if len(accel) else 0.0
+    factors = [factor for _, (low, high), factor in ACCEL_UNITS if low <= length < high]
+    return gyro * gyro_scale(times, gyro, accel), accel * (factors[0] if factors else 1.0)
+
+
+def gyro_scale(
+    times: NDArray[np.float64], gyro: NDArray[np.float64], accel: NDArray[np.float64]
+) -> float:
+    """Return what makes rad/s of the gyro: 1, or π/180 where it is certainly in deg/s."""
+    if len(times) < MIN_SAMPLES:
+        return 1.0
+    is_fast = _fast_rate(gyro) > MAX_RATE
+    return DEGREE if is_fast or _GravityWindows(times, gyro, accel).explained_by(DEGREE) else 1.0
+
+
+def _fast_rate(gyro: NDArray[np.float64]) -> float:
+    return float(np.percentile(np.linalg.norm(gyro, axis=1), 99))
+
+
+def _accel_problem(accel: NDArray[np.float64]) -> str | None:
+    length = float(np.median(np.linalg.norm(accel, axis=1)))
+    if ACCEL_RANGE[0] <= length <= ACCEL_RANGE[1]:
+        return None
+    if length == 0.0:
+        return "the accelerations are all zero; switch the accelerometer on in the driver"
+    for unit, (low, high), factor in ACCEL_UNITS:
+        if low <= length < high:
+            return (
+                f"the accelerations are in {unit} (median length {length:.4g}, expected 9.8 "
+                f"m/s²); multiply by {factor:g} to get m/s² in the driver or the recording"
+            )
+    return (
+        f"the accelerations have a median length of {length:.4g}, expected 9.8 m/s²; check the "
+        "unit and scale in the driver"
+    )
+
+
+def _gyro_problem(
+    times: NDArray[np.float64], gyro: NDArray[np.float64], accel: NDArray[np.float64]
+) -> str | None:
+    fast = _fast_rate(gyro)
+    repair = "multiply by 0.0174533 to get rad/s in the driver or the recording"
+    if fast > MAX_RATE:
+        return (
+            f"the angular rates are in deg/s (up to {fast:.4g}, no common gyro measures beyond "
+            f"{MAX_RATE:g} rad/s); {repair}"
+        )
+    windows = _GravityWindows(times, gyro, accel)
+    if windows.explained_by(DEGREE):
+        return f"the angular rates are in deg/s (gravity turns as slowly in the accelerations); {repair}"
+    mirrored = [
+        axes
+        for axes in itertools.product((1.0, -1.0), repeat=3)
+        if -1.0 in axes and windows.explained_by(1.0, axes)
+    ]
+    if not mirrored:
+        return None
+    best = min(mirrored, key=lambda axes: windows.residual(1.0, axes))
+    names = " and ".join(name for name, sign in zip("xyz", best, strict=True) if sign < 0)
+    return (
+        f"gyro and accelerometer disagree about the direction of axis {names}; flip the sign of "
+        f"{names} in one of them, so that the axes are right-handed"
+    )
+
+
+class _GravityWindows:
+    """Short windows with the direction of gravity at both ends and the gyro between.
+
+    `starts`, `ends`: (W, 3) unit vectors, imu frame; `steps`: (K, W, 3) rotation vectors of the
+    gyro, K samples per window.
+    """
+
+    def __init__(
+        self,
+        times: NDArray[np.float64],
+        gyro: NDArray[np.float64],
+        accel: NDArray[np.float64],
+    ) -> None:
+        dt = float(np.median(np.diff(times)))
+        n_window = max(2, round(WINDOW / dt))
+        n_average = max(1, round(WINDOW / 3 / dt)) | 1
+        kernel = np.ones(n_average) / n_average
+        smooth = np.column_stack([np.convolve(accel[:, i], kernel, "same") for i in range(3)])
+        directions = smooth / np.maximum(np.linalg.norm(smooth, axis=1, keepdims=True), 1e-9)
+        first = np.arange(n_average, len(times) - n_window - n_average, max(1, n_window // 2))
+        first = first[times[first + n_window] - times[first] < 2 * WINDOW]
+        self.starts, self.ends = directions[first], directions[first + n_window]
+        mid_rates = (gyro[:-1] + gyro[1:]) / 2 * np.diff(times)[:, None]
+        self.steps = mid_rates[first[None, :] + np.arange(n_window)[:, None]]
+
+    def residual(self, scale: float, signs: tuple[float, ...] = (1.0, 1.0, 1.0)) -> float:
+        """Return the sum of squared differences between gravity as measured and as turned."""
+        predicted = self.starts
+        for step in self.steps * (scale * np.array(signs)):
+            predicted = _turned_back(predicted, step)
+        return float(((predicted - self.ends) ** 2).sum())
+
+    def explained_by(self, scale: float, signs: tuple[float, ...] = (1.0, 1.0, 1.0)) -> bool:
+        """Whether this reading of the gyro explains how gravity turns, and the plain one does not."""
+        residual = self.residual(scale, signs)
+        return residual < EXPLAINS * self.residual(0.0) and residual < BETTER * self.residual(1.0)
+
+
+def _turned_back(
+    vectors: NDArray[np.float64], rotations: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """(W, 3) fixed directions as seen from a frame that has turned by (W, 3) rotation vectors."""
+    angles = np.linalg.norm(rotations, axis=1, keepdims=True)
+    axes = rotations / np.maximum(angles, 1e-12)
+    along = (vectors * axes).sum(axis=1, keepdims=True) * axes
+    # Rodrigues' formula with the negative angle.
+    across = np.cos(angles) * (vectors - along) - np.sin(angles) * np.cross(axes, vectors)
+    return np.asarray(along + across)

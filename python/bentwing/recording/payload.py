@@ -1,0 +1,242 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""The description of the sensor head: payload.yaml as a frozen, validated value.
+
+Units are metres, radians and seconds; noise values are continuous densities. `T_a_b` takes
+coordinates in b to coordinates in a; quaternions are Hamilton, x y z w.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, get_args
+
+import numpy as np
+import yaml
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+
+from bentwing.errors import PayloadError
+from bentwing.recording.lidar_kinds import KIND_DEFAULTS, LidarKind
+from bentwing.recording.payload_errors import describe
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Vector = tuple[Finite, Finite, Finite]
+Quaternion = tuple[Finite, Finite, Finite, Finite]
+Topic = Annotated[str, Field(min_length=1)]
+
+MAX_LEVER = 10.0  # m; a sensor farther away on the same carrier is a mistake of units
+QUATERNION_TOLERANCE = 1e-3  # rounding to three digits is repaired, anything worse is refused
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Transform(_Section):
+    """Rigid transform, `translation` in m and `quaternion` x y z w (normalized on entry)."""
+
+    translation: Vector = (0.0, 0.0, 0.0)
+    quaternion: Quaternion = (0.0, 0.0, 0.0, 1.0)
+
+    @field_validator("translation")
+    @classmethod
+    def _plausible_lever(cls, value: Vector) -> Vector:
+        distance = float(np.linalg.norm(value))
+        if distance > MAX_LEVER:
+            msg = f"is {distance:.4g} m long, more than {MAX_LEVER:g} m: give it in metres"
+            raise ValueError(msg)
+        return value
+
+    @field_validator("quaternion")
+    @classmethod
+    def _normalized(cls, value: Quaternion) -> Quaternion:
+        norm = float(np.linalg.norm(value))
+        if not abs(norm - 1.0) <= QUATERNION_TOLERANCE:
+            msg = f"has norm {norm:.4g}, expected 1: give a unit quaternion in the order x y z w"
+            raise ValueError(msg)
+        # Leave quaternions that are unit up to rounding alone, so that a payload written out and
+        # read again is the same value.
+        if abs(norm - 1.0) < 1e-15:
+            return value
+        x, y, z, w = (component / norm for component in value)
+        return x, y, z, w
+
+    @property
+    def matrix(self) -> NDArray[np.float64]:
+        """(4, 4) float64, homogeneous."""
+        x, y, z, w = self.quaternion
+        matrix = np.eye(4)
+        matrix[:3, :3] = [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+        matrix[:3, 3] = self.translation
+        return matrix
+
+
+class Lidar(_Section):
+    """The lidar; `topic` None means the only topic of a lidar type in the recording.
+
+    Ranges and `range_sigma` (one standard deviation) are in m and default by `kind`.
+    """
+
+    topic: Topic | None = None
+    kind: LidarKind = "generic"
+    min_range: NonNegative = 0.0
+    max_range: Positive = 0.0
+    range_sigma: Positive = 0.0
+
+    @model_validator(mode="before")
+    @classmethod
+    def _defaults_by_kind(cls, data: Any) -> Any:  # noqa: ANN401 - before validation
+        if not isinstance(data, dict):
+            return data
+        kind = data.get("kind", "generic")
+        # An unknown kind is reported by its own field.
+        defaults = KIND_DEFAULTS[kind if kind in get_args(LidarKind) else "generic"]
+        names = ("min_range", "max_range", "range_sigma")
+        return {name: getattr(defaults, name) for name in names} | data
+
+    @model_validator(mode="after")
+    def _ordered_ranges(self) -> Lidar:
+        if self.min_range >= self.max_range:
+            msg = f"min_range {self.min_range:g} m must be below max_range {self.max_range:g} m"
+            raise ValueError(msg)
+        return self
+
+
+class Imu(_Section):
+    """The IMU; `topic` None means the only Imu topic in the recording.
+
+    gyro_noise : rad/s/√Hz; accel_noise : m/s²/√Hz (densities that include the vibration)
+    gyro_bias_walk : rad/s²/√Hz; accel_bias_walk : m/s³/√Hz
+    """
+
+    topic: Topic | None = None
+    gyro_noise: Positive = 5.0e-4
+    accel_noise: Positive = 8.0e-4
+    gyro_bias_walk: Positive = 1.0e-5
+    accel_bias_walk: Positive = 1.0e-4
+
+
+class Box(_Section):
+    """Axis-aligned box in the lidar frame, corners in m."""
+
+    min: Vector
+    max: Vector
+
+    @model_validator(mode="after")
+    def _has_volume(self) -> Box:
+        if any(low >= high for low, high in zip(self.min, self.max, strict=True)):
+            msg = f"min {list(self.min)} must be below max {list(self.max)} on every axis"
+            raise ValueError(msg)
+        return self
+
+
+class SelfHit(_Section):
+    """A region in the lidar frame where returns are from the carrier itself."""
+
+    box: Box
+
+
+class Encoder(_Section):
+    """The motor that turns the lidar: T_imu_lidar(θ) = T_imu_motor · Rot(axis, θ) · T_motor_lidar.
+
+    `axis` is a unit vector in the motor frame (normalized on entry).
+    """
+
+    topic: Topic | None = None
+    axis: Vector = (0.0, 0.0, 1.0)
+    T_imu_motor: Transform = Transform()
+    T_motor_lidar: Transform = Transform()
+
+    @field_validator("axis")
+    @classmethod
+    def _unit_axis(cls, value: Vector) -> Vector:
+        norm = float(np.linalg.norm(value))
+        if norm < 1e-6:
+            msg = f"has length {norm:.3g}: give the direction of the motor's axis"
+            raise ValueError(msg)
+        if abs(norm - 1.0) < 1e-15:
+            return value
+        x, y, z = (component / norm for component in value)
+        return x, y, z
+
+
+class Gnss(_Section):
+    """GNSS fixes (NavSatFix), used only when named."""
+
+    topic: Topic
+
+
+class Payload(_Section):
+    """The sensor head.
+
+    `imu: null` in the file says that the recording's IMU is not to be used.
+    """
+
+    name: str = "payload"
+    lidar: Lidar = Field(default_factory=lambda: Lidar.model_validate({}))
+    imu: Imu | None = Field(default_factory=Imu)
+    T_imu_lidar: Transform | None = None
+    self_hits: tuple[SelfHit, ...] = ()
+    encoder: Encoder | None = None
+    gnss: Gnss | None = None
+
+    @classmethod
+    def default(cls) -> Payload:
+        """Return what is assumed without a payload file: a generic lidar, no IMU described."""
+        return cls()
+
+    @classmethod
+    def load(cls, path: Path | str) -> Payload:
+        """Read a payload.yaml.
+
+        Raises
+        ------
+        PayloadError
+            The file cannot be read or is invalid; all problems in one sentence.
+        """
+        data = _read_yaml(Path(path))
+        if not isinstance(data, dict):
+            msg = f"{path}: expected a mapping of sections (lidar, imu, T_imu_lidar, …), found {type(data).__name__}"
+            raise PayloadError(msg)
+        try:
+            return cls.model_validate(data)
+        except ValidationError as error:
+            raise PayloadError(describe(error, cls, path)) from None
+
+    @property
+    def describes_imu(self) -> bool:
+        """Whether the file says that the head carries an IMU."""
+        named = "imu" in self.model_fields_set or self.T_imu_lidar is not None
+        return self.imu is not None and named
+
+    @property
+    def places_lidar_on_imu(self) -> bool:
+        """Whether the lidar's pose in the IMU frame is given, fixed or through the encoder."""
+        return self.T_imu_lidar is not None or self.encoder is not None
+
+    def T_imu_lidar_matrix(self) -> NDArray[np.float64]:
+        """(4, 4) of the fixed mount; the identity where none is given (no IMU)."""
+        return np.eye(4) if self.T_imu_lidar is None else self.T_imu_lidar.matrix
+
+
+def _read_yaml(path: Path) -> object:
+    try:
+        return yaml.safe_load(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        msg = f"{path}: no such file; give the payload.yaml that describes the sensor head"
+        raise PayloadError(msg) from None
+    except (OSError, UnicodeDecodeError) as error:
+        msg = f"{path}: cannot be read ({error}); give a YAML text file"
+        raise PayloadError(msg) from None
+    except yaml.YAMLError as error:
+        place = " ".join(str(error).split())
+        msg = f"{path}: not valid YAML ({place})"
+        raise PayloadError(msg) from None

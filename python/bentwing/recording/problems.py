@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""Sentences on what a recording lacks for mapping, each with what to do."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from bentwing.recording.clock import NS_PER_S
+from bentwing.recording.topics import LASER_SCAN, MULTI_ECHO
+
+if TYPE_CHECKING:
+    from bentwing.recording.peek import Peek
+
+MAX_CLOCK_OFFSET = 10.0  # s between the sensors' clocks; more and they do not share one
+
+
+def mount(imu_topic: str) -> str:
+    """Return the sentence on an IMU whose place relative to the lidar is not known."""
+    return (
+        f"the recording has an IMU ({imu_topic}), but the payload does not say where the lidar is "
+        "on it: give T_imu_lidar (translation in m, quaternion x y z w), or 'imu: null' to map "
+        "with the lidar alone"
+    )
+
+
+def point_times(lidar_topic: str, lidar_type: str) -> str:
+    """Return the sentence on a lidar that does not tell when each point was measured."""
+    if lidar_type in (LASER_SCAN, MULTI_ECHO):
+        return (
+            f"{lidar_topic}: no time per beam (time_increment is 0), so a moving scan cannot be "
+            "undistorted; set time_increment (time per turn / beams per turn) in the lidar's "
+            "driver and record again"
+        )
+    return (
+        f"{lidar_topic}: no time per point (no field t, time or timestamp that varies within a "
+        "cloud), so a moving sweep cannot be undistorted; switch it on in the lidar's driver and "
+        "record again"
+    )
+
+
+def clocks(lidar: Peek, other: Peek) -> str | None:
+    """Return the sentence on two sensors stamped by different clocks, None if they share one."""
+    difference = (other.offset_ns - lidar.offset_ns) / NS_PER_S
+    if abs(difference) <= MAX_CLOCK_OFFSET:
+        return None
+    return (
+        f"{other.topic.name} and {lidar.topic.name} are stamped by clocks {difference:+.1f} s "
+        "apart; let both drivers stamp with the host's clock, or synchronize them, and record again"
+    )

@@ -1,0 +1,274 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""A recording: files and payload in, batches of lidar, IMU and encoder samples out."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from bentwing.errors import PayloadError, RecordingError
+from bentwing.recording import imu_units, problems
+from bentwing.recording.clock import NS_PER_S, Clock
+from bentwing.recording.lidar_stream import LidarStream
+from bentwing.recording.payload import Payload
+from bentwing.recording.peek import Peek, peek
+from bentwing.recording.slots import group_into_slots, trimmed
+from bentwing.recording.source import open_source
+from bentwing.recording.stream_warnings import stream_warnings
+from bentwing.recording.streams import EncoderStream, ImuStream
+from bentwing.recording.topics import resolve
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+    from types import TracebackType
+
+    from typing_extensions import Self
+
+    from bentwing.recording.batches import Batch
+    from bentwing.recording.scanned import TopicInfo
+    from bentwing.recording.streams import Stream
+
+SEEK_MARGIN = 5.0  # s by which messages may reach the recorder late
+
+
+class Recording:
+    """One recording, opened.
+
+    Parameters
+    ----------
+    paths : one file or folder, or the consecutive parts of one recording
+    payload : the sensor head; default: a generic lidar without IMU
+    strict : refuse what cannot be mapped (no time per point, IMU in wrong units, …); False only
+        reports, for inspection
+
+    Raises
+    ------
+    RecordingError, PayloadError
+        The recording cannot be read, or does not match the payload.
+    """
+
+    def __init__(
+        self,
+        paths: Path | str | Sequence[Path | str],
+        payload: Payload | None = None,
+        *,
+        strict: bool = True,
+    ) -> None:
+        listed = [paths] if isinstance(paths, (str, Path)) else list(paths)
+        self.paths = [Path(path) for path in listed]
+        self.payload = payload or Payload.default()
+        self.strict = strict
+        self._source = open_source(self.paths)
+        self._streams: dict[str, Stream] = {}
+        try:
+            self._survey()
+        except BaseException:
+            self.close()
+            raise
+
+    def _survey(self) -> None:
+        roles = resolve(self._source.topics, self.payload)
+        self._peeks: dict[str, Peek] = {
+            role: peek(self._source, topic)
+            for role, topic in roles._asdict().items()
+            if topic is not None
+        }
+        self.clock = Clock(min(found.first_ns for found in self._peeks.values()))
+        if self.strict:
+            self._check_fitness()
+
+    def _check_fitness(self) -> None:
+        if "imu" in self._peeks and not self.payload.places_lidar_on_imu:
+            raise PayloadError(problems.mount(self.imu_topic or ""))
+        if self.point_times is None:
+            raise RecordingError(problems.point_times(self.lidar_topic, self.lidar_type))
+        for problem in self.clock_problems():
+            raise RecordingError(problem)
+        if "imu" in self._peeks:
+            imu_units.check(self.imu_topic or "", self._first_imu_batches())
+
+    def clock_problems(self) -> list[str]:
+        """Return a sentence for each sensor that does not share the lidar's clock."""
+        lidar = self._peeks["lidar"]
+        others = [self._peeks[role] for role in ("imu", "encoder") if role in self._peeks]
+        found = [problems.clocks(lidar, other) for other in others]
+        return [problem for problem in found if problem is not None]
+
+    def _first_imu_batches(self) -> Iterator[Batch]:
+        """Yield the IMU's samples alone, in a pass of their own that leaves the counts as is."""
+        streams = {self._peeks["imu"].topic.name: self._stream("imu")}
+        messages = self._source.messages(streams)
+        return group_into_slots(messages, streams)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        exc_type: type[BaseException] | None,
+        exc: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the files."""
+        self._source.close()
+
+    @property
+    def topics(self) -> tuple[TopicInfo, ...]:
+        """All topics of the recording: name, type, count."""
+        return self._source.topics
+
+    @property
+    def lidar_topic(self) -> str:
+        """The lidar's topic."""
+        return self._peeks["lidar"].topic.name
+
+    @property
+    def imu_topic(self) -> str | None:
+        """The IMU's topic, None without IMU."""
+        return self._topic("imu")
+
+    @property
+    def encoder_topic(self) -> str | None:
+        """The encoder's topic, None without encoder."""
+        return self._topic("encoder")
+
+    @property
+    def point_times(self) -> str | None:
+        """A sentence on how the time of each point is known; None where it is not."""
+        return self._peeks["lidar"].point_times
+
+    @property
+    def start_ns(self) -> int:
+        """Stamp of the earliest sample, ns UTC as in the source."""
+        return self.clock.start_ns
+
+    @property
+    def end_ns(self) -> int:
+        """Stamp of the end, ns; from the recorder's clock, exact to the messages' delay."""
+        return self.start_ns + max(0, self._source.end_ns - self._source.start_ns)
+
+    @property
+    def duration(self) -> float:
+        """Seconds from start to end."""
+        return (self.end_ns - self.start_ns) / NS_PER_S
+
+    @property
+    def counts(self) -> Counter[str]:
+        """What the latest pass over `batches` read and dropped so far, by `<stream>.<reason>`."""
+        return Counter(
+            {
+                f"{role}.{name}": n
+                for role, stream in self._streams.items()
+                for name, n in stream.counts.items()
+                if n
+            }
+        )
+
+    @property
+    def gaps(self) -> dict[str, list[tuple[float, float]]]:
+        """Silences by topic as (start, length) in s; complete after a pass over `batches`."""
+        return {
+            self._peeks[role].topic.name: [
+                ((gap.start_ns - self.start_ns) / NS_PER_S, (gap.end_ns - gap.start_ns) / NS_PER_S)
+                for gap in stream.monitor.gaps
+            ]
+            for role, stream in self._streams.items()
+        }
+
+    @property
+    def lidar_type(self) -> str:
+        """The type of the lidar's topic, e.g. sensor_msgs/msg/LaserScan."""
+        return self._peeks["lidar"].topic.type
+
+    @property
+    def warnings(self) -> list[str]:
+        """What was found odd so far, as sentences; complete after a pass over `batches`."""
+        sentences = list(self._source.warnings)
+        gnss = self.payload.gnss
+        if gnss is not None and gnss.topic not in {topic.name for topic in self.topics}:
+            sentences.append(
+                f"the payload names the gnss topic {gnss.topic}, which the recording does not have; "
+                "the map stays in its own frame"
+            )
+        for role, found in self._peeks.items():
+            if found.use_recorder_time:
+                sentences.append(
+                    f"{found.topic.name}: all header stamps are zero, the recorder's time is used "
+                    "instead; let the driver stamp its messages, or expect jitter"
+                )
+            if role in self._streams:
+                sentences += stream_warnings(found.topic.name, self._streams[role], self.clock)
+        return sentences
+
+    def batches(self, start: float | None = None, duration: float | None = None) -> Iterator[Batch]:
+        """Yield the batches in the order of the recording, about 0.1 s of a stream in each.
+
+        Parameters
+        ----------
+        start, duration : s, part of the recording to read, relative to its start
+
+        Raises
+        ------
+        RecordingError
+            (strict) Nothing of the lidar could be used.
+        """
+        begin = 0.0 if start is None else start
+        end = float("inf") if duration is None else begin + duration
+        order: tuple[str, ...] = ("encoder", "imu", "lidar")
+        roles = [role for role in order if role in self._peeks]
+        streams = {role: self._stream(role) for role in roles}
+        self._streams = streams
+        by_topic = {self._peeks[role].topic.name: stream for role, stream in streams.items()}
+        messages = self._source.messages(set(by_topic), self._seek_ns(begin))
+        n_points = 0
+        for batch in group_into_slots(messages, by_topic, self._stop_ns(end)):
+            if (part := trimmed(batch, begin, end)) is not None:
+                n_points += hasattr(part, "points")
+                yield part
+        if self.strict and n_points == 0:
+            self._refuse_empty(begin, end)
+
+    def _seek_ns(self, begin: float) -> int | None:
+        if begin <= SEEK_MARGIN:
+            return None
+        return self._source.start_ns + int((begin - SEEK_MARGIN) * NS_PER_S)
+
+    def _stop_ns(self, end: float) -> int | None:
+        if end == float("inf"):
+            return None
+        return self._source.start_ns + int((end + SEEK_MARGIN) * NS_PER_S)
+
+    def _stream(self, role: str) -> Stream:
+        found = self._peeks[role]
+        name, cdr, zero = found.topic.name, self._source.cdr, found.use_recorder_time
+        if role == "imu":
+            return ImuStream(name, self.clock, cdr=cdr, use_recorder_time=zero)
+        if role == "encoder":
+            return EncoderStream(name, self.clock, cdr=cdr, use_recorder_time=zero)
+        return LidarStream(
+            name,
+            found.topic.type,
+            self.clock,
+            cdr=cdr,
+            use_recorder_time=zero,
+            reading=found.reading,
+            needs_beam_times=self.strict,
+        )
+
+    def _topic(self, role: str) -> str | None:
+        return self._peeks[role].topic.name if role in self._peeks else None
+
+    def _refuse_empty(self, begin: float, end: float) -> None:
+        lidar = self._streams["lidar"].counts
+        dropped = ", ".join(f"{n} {name}" for name, n in lidar.items() if n and name != "messages")
+        msg = (
+            f"{self.lidar_topic}: no valid return between {begin:.1f} and "
+            f"{min(end, self.duration):.1f} s ({lidar['messages']} messages; "
+            f"{dropped or 'no returns'}); check that the lidar was not covered and that --start "
+            "and --duration lie within the recording"
+        )
+        raise RecordingError(msg)

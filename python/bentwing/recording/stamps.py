@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""Decide message by message which stamp counts: header or recorder, and whether it may be used."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+from bentwing.errors import RecordingError
+
+if TYPE_CHECKING:
+    from collections import Counter
+
+NS_PER_S = 1_000_000_000
+MAX_OFFSET_STEP_NS = 10 * NS_PER_S  # header against recorder; less is transport delay
+MAX_UNCONFIRMED_NS = NS_PER_S  # a larger step ahead of the recorder has to be confirmed
+MAX_JUMPS = 50  # consecutive messages; more is a clock that was set, not a damaged stamp
+MIN_GAP_NS = NS_PER_S // 2
+GAP_PERIODS = 5
+
+
+class Gap(NamedTuple):
+    """Silence of a stream; absolute stamps in ns of the messages around it."""
+
+    start_ns: int
+    end_ns: int
+
+
+class StampMonitor:
+    """Stamps of one stream, made increasing.
+
+    Parameters
+    ----------
+    topic : for messages
+    use_recorder_time : the header stamps are all zero, so the recorder's clock has to do
+    counts : receives `backwards_stamps`, `duplicate_stamps`, `stamp_jumps`
+    """
+
+    def __init__(self, topic: str, *, use_recorder_time: bool, counts: Counter[str]) -> None:
+        self.gaps: list[Gap] = []
+        self.first_backwards_ns: int | None = None
+        self._topic, self._counts = topic, counts
+        self._use_recorder_time = use_recorder_time
+        self._last_ns: int | None = None
+        self._last_offset_ns = 0
+        self._n_jumps = 0
+        self._period_ns = 0.0
+        self._suspect: tuple[int, int] | None = None
+
+    def accept(self, header_ns: int, recorder_ns: int) -> int | None:
+        """Return the stamp to use in ns, or None for a message to drop."""
+        stamp_ns = recorder_ns if self._use_recorder_time else header_ns
+        offset_ns = stamp_ns - recorder_ns
+        if self._last_ns is None:
+            self._take(stamp_ns, offset_ns)
+            return stamp_ns
+        if abs(offset_ns - self._last_offset_ns) > MAX_OFFSET_STEP_NS:
+            self._reject_jump(offset_ns)
+            return None
+        if self._is_unconfirmed(stamp_ns, offset_ns):
+            self._counts["stamp_jumps"] += 1
+            return None
+        step_ns = stamp_ns - self._last_ns
+        if step_ns <= 0:
+            self._counts["duplicate_stamps" if step_ns == 0 else "backwards_stamps"] += 1
+            if step_ns < 0 and self.first_backwards_ns is None:
+                self.first_backwards_ns = stamp_ns
+            return None
+        self._note_gap(step_ns)
+        self._take(stamp_ns, offset_ns)
+        return stamp_ns
+
+    def _take(self, stamp_ns: int, offset_ns: int) -> None:
+        self._last_ns, self._last_offset_ns, self._n_jumps = stamp_ns, offset_ns, 0
+        self._suspect = None
+
+    def _is_unconfirmed(self, stamp_ns: int, offset_ns: int) -> bool:
+        """Whether a stamp runs ahead of the recorder's clock and no message before it did so too.
+
+        Taking a single damaged stamp would make all the good ones after it go backwards.
+        """
+        if offset_ns - self._last_offset_ns <= MAX_UNCONFIRMED_NS:
+            return False
+        before, self._suspect = self._suspect, (stamp_ns, offset_ns)
+        if before is None:
+            return True
+        return stamp_ns <= before[0] or abs(offset_ns - before[1]) > MAX_UNCONFIRMED_NS
+
+    def _reject_jump(self, offset_ns: int) -> None:
+        self._counts["stamp_jumps"] += 1
+        self._n_jumps += 1
+        if self._n_jumps > MAX_JUMPS:
+            step = (offset_ns - self._last_offset_ns) / NS_PER_S
+            msg = (
+                f"{self._topic}: the header stamps step by {step:+.1f} s and stay there, the clock "
+                "was set during the recording; map the part before or after it with --start and "
+                "--duration"
+            )
+            raise RecordingError(msg)
+
+    def _note_gap(self, step_ns: int) -> None:
+        limit_ns = max(MIN_GAP_NS, GAP_PERIODS * self._period_ns)
+        if step_ns > limit_ns and self._period_ns and self._last_ns is not None:
+            self.gaps.append(Gap(self._last_ns, self._last_ns + step_ns))
+            return
+        # A slow average, so that one late message does not hide the gap after it.
+        self._period_ns = 0.9 * self._period_ns + 0.1 * step_ns if self._period_ns else step_ns

@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""From the raw messages of one topic to batches: one stream each for IMU, encoder and lidar."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from bentwing.recording import wire
+from bentwing.recording.batches import EncoderBatch, ImuBatch
+from bentwing.recording.stamps import StampMonitor
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from bentwing.recording.batches import Batch
+    from bentwing.recording.clock import Clock
+
+RawMessage = tuple[int, bytes]  # recorder's time in ns, bytes
+MAX_ENCODER_ANGLE = 1e6  # rad; more is damage
+MAX_IMU_VALUE = 1e6  # rad/s or m/s²; more is damage
+
+
+class Stream(Protocol):
+    """One topic on its way to batches; made anew for every pass over the recording."""
+
+    counts: Counter[str]
+    monitor: StampMonitor
+
+    def decode(self, messages: Sequence[RawMessage]) -> Batch | None:
+        """Return the batch of the next messages, if anything of them can be handed out yet."""
+
+    def finish(self) -> Batch | None:
+        """Return what was held back."""
+
+
+class ImuStream:
+    """sensor_msgs/Imu."""
+
+    def __init__(self, topic: str, clock: Clock, *, cdr: bool, use_recorder_time: bool) -> None:
+        self.counts: Counter[str] = Counter()
+        self.monitor = StampMonitor(topic, use_recorder_time=use_recorder_time, counts=self.counts)
+        self._clock, self._cdr = clock, cdr
+
+    def decode(self, messages: Sequence[RawMessage]) -> ImuBatch | None:
+        """Return the samples of the next messages."""
+        stamps_ns, bodies = [], []
+        for recorder_ns, raw in messages:
+            try:
+                header_ns, body = wire.imu(raw, cdr=self._cdr)
+            except wire.BrokenMessageError:
+                self.counts["broken_messages"] += 1
+                continue
+            stamp_ns = self.monitor.accept(header_ns, recorder_ns)
+            if stamp_ns is not None:
+                stamps_ns.append(stamp_ns)
+                bodies.append(body)
+        self.counts["samples"] += len(stamps_ns)
+        values = np.frombuffer(b"".join(bodies), "<f8").reshape(-1, 37).astype(np.float64)
+        gyro, accel = values[:, 13:16], values[:, 25:28]
+        keep = self._usable(gyro, accel)
+        if not keep.any():
+            return None
+        times = self._clock.to_seconds(np.array(stamps_ns, dtype=np.int64)[keep])
+        return ImuBatch(times, np.ascontiguousarray(gyro[keep]), np.ascontiguousarray(accel[keep]))
+
+    def _usable(self, gyro: np.ndarray, accel: np.ndarray) -> np.ndarray:
+        both = np.hstack([gyro, accel])
+        is_finite = np.isfinite(both).all(axis=1)
+        self.counts["nan"] += int((~is_finite).sum())
+        with np.errstate(invalid="ignore"):
+            is_small = (np.abs(both) < MAX_IMU_VALUE).all(axis=1)
+        self.counts["out_of_range"] += int((is_finite & ~is_small).sum())
+        return np.asarray(is_finite & is_small)
+
+    def finish(self) -> None:
+        """Nothing is held back."""
+
+
+class EncoderStream:
+    """sensor_msgs/JointState, position[0], unwrapped over the whole pass."""
+
+    def __init__(self, topic: str, clock: Clock, *, cdr: bool, use_recorder_time: bool) -> None:
+        self.counts: Counter[str] = Counter()
+        self.monitor = StampMonitor(topic, use_recorder_time=use_recorder_time, counts=self.counts)
+        self._clock, self._cdr = clock, cdr
+        self._last_angle: float | None = None
+
+    def decode(self, messages: Sequence[RawMessage]) -> EncoderBatch | None:
+        """Return the angles of the next messages."""
+        stamps_ns, angles = [], []
+        for recorder_ns, raw in messages:
+            try:
+                header_ns, angle = wire.joint_position(raw, cdr=self._cdr)
+            except wire.BrokenMessageError:
+                self.counts["broken_messages"] += 1
+                continue
+            if not abs(angle) < MAX_ENCODER_ANGLE:
+                self.counts["nan"] += 1
+                continue
+            stamp_ns = self.monitor.accept(header_ns, recorder_ns)
+            if stamp_ns is not None:
+                stamps_ns.append(stamp_ns)
+                angles.append(angle)
+        self.counts["samples"] += len(stamps_ns)
+        if not stamps_ns:
+            return None
+        first = [] if self._last_angle is None else [self._last_angle]
+        unwrapped = np.unwrap(np.array([*first, *angles]))[len(first) :]
+        self._last_angle = float(unwrapped[-1])
+        return EncoderBatch(self._clock.to_seconds(np.array(stamps_ns, dtype=np.int64)), unwrapped)
+
+    def finish(self) -> None:
+        """Nothing is held back."""

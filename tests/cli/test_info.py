@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""`bentwing info` as a user runs it."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from bentwing.cli.info import info
+from bentwing.errors import PayloadError, RecordingError
+
+
+def run(*arguments):
+    app = typer.Typer()
+    app.command()(info)
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+@pytest.fixture
+def head(tmp_path, ros1, head_entries):
+    return ros1.write(tmp_path / "head.bag", head_entries(ros1))
+
+
+def test_the_page_tells_topics_spin_and_verdict(head):
+    result = run(head)
+    assert result.exit_code == 0, result.output
+    for text in ("/scan", "/imu", "39.6", "4.00 rad/s", "time per beam", "fit for mapping"):
+        assert text in result.output
+
+
+def test_json_is_machine_readable(head):
+    result = run(head, "--json")
+    found = json.loads(result.output)
+    assert found["is_fit"] is True
+    assert {topic["role"] for topic in found["topics"]} == {"lidar", "imu"}
+    assert found["structure"]["far_share"] == 0.0
+
+
+def test_the_payload_is_used(head, tmp_path):
+    payload = tmp_path / "payload.yaml"
+    payload.write_text("encoder: {topic: /encoder}")
+    assert "names the encoder topic /encoder" in " ".join(
+        run(head, "--payload", payload).output.split()
+    )
+
+
+def test_a_bad_payload_is_a_payload_error(head, tmp_path):
+    payload = tmp_path / "payload.yaml"
+    payload.write_text("lidar: {max_rang: 3}")
+    assert isinstance(run(head, "--payload", payload).exception, PayloadError)
+
+
+def test_a_missing_recording_is_a_recording_error(tmp_path):
+    assert isinstance(run(tmp_path / "none.bag").exception, RecordingError)
+
+
+def test_several_parts_are_one_recording(tmp_path, ros1, head_entries):
+    entries = head_entries(ros1)
+    parts = [
+        ros1.write(tmp_path / f"{i}.bag", entries[start:stop])
+        for i, (start, stop) in enumerate([(0, 240), (240, None)])
+    ]
+    found = json.loads(run(*parts, "--json").output)
+    assert {topic["count"] for topic in found["topics"]} == {80, 400}
+
+
+def test_the_planar_rover_is_refused_for_its_real_defects(shared_data):
+    found = json.loads(run(shared_data / "planar_rover" / "loop2", "--json").output)
+    assert not found["is_fit"]
+    defects = "\n".join(found["defects"])
+    for text in (
+        "no time per beam",
+        "in milli-g",
+        "multiply by 0.00980665",
+        "in deg/s",
+        "multiply by 0.0174533",
+        "one axis is mirrored",
+        "cannot make a 3D map",
+    ):
+        assert text in defects
+    assert len(found["defects"]) == 5
+
+
+def test_the_ouster_file_is_refused_for_its_two_clocks(shared_data):
+    found = json.loads(run(shared_data / "packets" / "ouster_os1_64.mcap", "--json").output)
+    (defect,) = found["defects"]
+    assert "stamped by clocks" in defect

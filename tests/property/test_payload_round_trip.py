@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+from __future__ import annotations
+
+import numpy as np
+import yaml
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from bentwing.errors import PayloadError
+from bentwing.recording.payload import Payload
+
+length = st.floats(-5, 5)
+vector = st.tuples(length, length, length)
+positive = st.floats(1e-9, 1e3)
+quaternion = (
+    st.tuples(*[st.floats(-1, 1)] * 4)
+    .filter(lambda q: np.linalg.norm(q) > 0.1)
+    .map(lambda q: (np.array(q) / np.linalg.norm(q)).tolist())
+)
+transform = st.fixed_dictionaries({"translation": vector, "quaternion": quaternion})
+box = st.tuples(vector, st.tuples(*[st.floats(0.1, 5)] * 3)).map(
+    lambda pair: {"min": pair[0], "max": tuple(np.add(*pair).tolist())}
+)
+topic = st.text(min_size=1, max_size=20)
+payloads = st.fixed_dictionaries(
+    {},
+    optional={
+        "name": st.text(max_size=20),
+        "lidar": st.fixed_dictionaries(
+            {"kind": st.sampled_from(["hokuyo-utm30lx", "vlp16", "ouster", "livox", "hesai"])},
+            optional={"topic": topic, "range_sigma": positive},
+        ),
+        "imu": st.none() | st.fixed_dictionaries({}, optional={"gyro_noise": positive}),
+        "T_imu_lidar": st.none() | transform,
+        "self_hits": st.lists(st.fixed_dictionaries({"box": box}), max_size=3),
+        "encoder": st.none() | st.fixed_dictionaries({}, optional={"T_imu_motor": transform}),
+        "gnss": st.none() | st.fixed_dictionaries({"topic": topic}),
+    },
+)
+
+shared_tmp_path = settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+
+
+@given(data=payloads)
+@settings(shared_tmp_path, max_examples=60)
+def test_a_payload_written_and_read_again_is_the_same(tmp_path, data):
+    payload = Payload.model_validate(data)
+    path = tmp_path / "payload.yaml"
+    path.write_text(yaml.safe_dump(payload.model_dump(mode="json")), encoding="utf-8")
+    assert Payload.load(path) == payload
+
+
+@given(content=st.binary(max_size=200) | st.text(max_size=200).map(str.encode))
+@settings(shared_tmp_path, max_examples=100)
+def test_any_file_is_a_payload_or_a_payload_error(tmp_path, content):
+    path = tmp_path / "payload.yaml"
+    path.write_bytes(content)
+    try:
+        assert isinstance(Payload.load(path), Payload)
+    except PayloadError:
+        return

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""report"""
+"""The report: what a run found, as one page that opens anywhere."""

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
     from types import TracebackType
 
+    from typing_extensions import Self
+
     from bentwing.estimators.interface import Estimate
     from bentwing.trajectory import Trajectory
 
@@ -69,7 +71,7 @@ class RunFolder:
         self._earlier: list[str] = []
         self._started = time.monotonic()
 
-    def __enter__(self) -> RunFolder:
+    def __enter__(self) -> Self:
         self._earlier = _claim(self.path)
         self.save()
         return self
@@ -84,9 +86,13 @@ class RunFolder:
             self.record["complete"], self.record["stage"] = True, "done"
             self._remove_rest_of_earlier()
         else:
-            interrupted = isinstance(error, KeyboardInterrupt)
-            self.record["reason"] = "interrupted" if interrupted else _reason(error)
+            self.fail(error)
         self.save()
+
+    def fail(self, error: BaseException) -> None:
+        """Record why the run ends early."""
+        interrupted = isinstance(error, KeyboardInterrupt)
+        self.record["reason"] = "interrupted" if interrupted else str(error) or type(error).__name__
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
@@ -134,6 +140,8 @@ class RunFolder:
         self.record["timings"]["total"] = time.monotonic() - self._started
         written = [name for name in self.record["files"] if (self.path / name).exists()]
         record = plain({**self.record, "files": written})
+        if not self.record["complete"]:
+            record["files_of_earlier_run"] = [name for name in self._earlier if name not in written]
         write_text(self.path / RECORD, json.dumps(record, indent=1, allow_nan=False) + "\n")
 
     def _remove_rest_of_earlier(self) -> None:
@@ -172,7 +180,8 @@ def _claim(path: Path) -> list[str]:
         raise UsageError(msg)
     for entry in leftovers:
         entry.unlink()
-    names = [] if record is None else record.get("files", [])
+    record = record or {}
+    names = [*record.get("files", []), *record.get("files_of_earlier_run", [])]
     return [name for name in names if isinstance(name, str) and Path(name).name == name]
 
 
@@ -182,10 +191,6 @@ def _record(path: Path) -> dict[str, Any] | None:
     except (OSError, ValueError):
         return None
     return record if isinstance(record, dict) and record.get("kind") == _KIND else None
-
-
-def _reason(error: BaseException) -> str:
-    return str(error) or type(error).__name__
 
 
 def _peak_memory() -> int:

@@ -43,25 +43,25 @@ def project(
     trajectory : poses of the IMU in the map
     calibration : latency, `T_imu_lidar` and encoder zero of the estimate
     encoder : of a motor-turned lidar; its mount then stands in for `T_imu_lidar`
-    counts : receives `points_mapped`, `points_outside_trajectory` and `points_not_finite`
+    counts : receives `map.points`, `map.outside_trajectory` and `map.not_finite`
 
     Yields
     ------
     Chunks of about `POINTS_PER_CHUNK` points in the order of measurement.
     """
     counts = {} if counts is None else counts
-    for name in ("points_mapped", "points_outside_trajectory", "points_not_finite"):
+    for name in ("map.points", "map.outside_trajectory", "map.not_finite"):
         counts.setdefault(name, 0)
     for batch in _gathered(batches):
         times = batch.times - calibration.latency
         covered = trajectory.covers(times)
         finite = np.isfinite(batch.points).all(axis=1)
-        counts["points_outside_trajectory"] += int(np.count_nonzero(~covered))
-        counts["points_not_finite"] += int(np.count_nonzero(covered & ~finite))
+        counts["map.outside_trajectory"] += int(np.count_nonzero(~covered))
+        counts["map.not_finite"] += int(np.count_nonzero(covered & ~finite))
         keep = covered & finite
         if not keep.all():
             batch, times = batch.where(keep), times[keep]
-        counts["points_mapped"] += len(times)
+        counts["map.points"] += len(times)
         if len(times):
             yield MapChunk(
                 trajectory.transform_points(to_imu(batch, calibration, encoder), times),

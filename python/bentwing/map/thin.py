@@ -33,7 +33,7 @@ def thin(
     ----------
     chunks : stream of map chunks
     spacing : m, edge of the voxels
-    counts : receives `points_thinned`, the points left out
+    counts : receives `map.thinned`, the points left out
 
     Raises
     ------
@@ -51,12 +51,12 @@ def thin(
 def _thinned(
     chunks: Iterable[MapChunk], spacing: float, counts: dict[str, int]
 ) -> Iterator[MapChunk]:
-    counts.setdefault("points_thinned", 0)
+    counts.setdefault("map.thinned", 0)
     seen = VoxelSet()
     for chunk in chunks:
         keep = seen.add(voxel_keys(chunk.points, spacing)) if spacing else slice(None)
         kept = chunk.where(keep)
-        counts["points_thinned"] += len(chunk) - len(kept)
+        counts["map.thinned"] += len(chunk) - len(kept)
         if len(kept):
             yield kept
 

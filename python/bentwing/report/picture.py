@@ -19,8 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 PAPER = 255  # brightness where there is no point
-_GAP_PASSES = 3
-_ENCLOSED = 5  # filled neighbours of eight; a straight edge has three and must not grow
+_ENCLOSED = 3  # filled neighbours of eight
 _OUTLIERS = 0.1  # percent of the points on each side that may fall off the picture
 _NEIGHBOURS = ((0, 1), (1, 0), (0, -1), (-1, 0), (1, 1), (1, -1), (-1, 1), (-1, -1))
 
@@ -55,6 +54,7 @@ def render(
     max_height: int = 900,
     table: tuple[str, ...] = HEIGHT,
     shading: float = 1.0,
+    close_gaps: int = 3,
 ) -> View:
     """Draw points as seen from far away along one direction.
 
@@ -65,6 +65,7 @@ def render(
     width, max_height : pixels; the picture gets smaller pixels only as far as both allow
     table : colour map
     shading : 0 for flat colours, 1 for full eye-dome lighting
+    close_gaps : pixels by which gaps are filled from their edges; it thickens lines as well
     """
     left, right, bottom, top = _frame(across, up)
     pixel = max((right - left) / width, (top - bottom) / max_height, 1e-3)
@@ -76,7 +77,7 @@ def render(
     seen = front >= 0
     depth[seen] = toward[front[seen]]
     shade[seen] = (values[front[seen]] - low) / max(high - low, 1e-9)
-    for _ in range(_GAP_PASSES):
+    for _ in range(close_gaps):
         _close_gaps(depth, shade)
     light = 1 - shading * (1 - _eye_dome(depth, pixel))
     image = np.full((*shape, 3), PAPER, np.uint8)

@@ -64,8 +64,8 @@ def tiles(record: Mapping[str, Any], trajectory: Trajectory, points: NDArray[np.
         facts.append((f"{path_length(trajectory):,.0f} m", "path flown or walked"))
         if timings.get("total"):
             facts.append((f"{duration / timings['total']:.1f} {TIMES}", "real time"))
-    if "points_mapped" in counts:
-        facts.append((_amount(counts["points_mapped"]), "points in the map"))
+    if "map.points" in counts:
+        facts.append((_amount(counts["map.points"]), "points in the map"))
     if len(points):
         size = np.subtract(*np.percentile(points, [99.8, 0.2], axis=0))
         facts.append((f" {TIMES} ".join(f"{s:.0f}" for s in size) + " m", "extent"))

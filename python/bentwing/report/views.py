@@ -104,7 +104,9 @@ def _upright(
     beside: NDArray[np.float64],
     name: str,
 ) -> str:
-    view = render(points @ along, points[:, 2], -(points @ beside), points[:, 2], max_height=420)
+    across, up, toward = points @ along, points[:, 2], -(points @ beside)
+    # gaps stay, because closing them would make walls look thicker than they are
+    view = render(across, up, toward, up, max_height=420, close_gaps=0)
     return map_view(view, "height, m", HEIGHT, name=name, text_size=13)
 
 

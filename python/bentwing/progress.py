@@ -161,7 +161,7 @@ def _rate(done: float, elapsed: float, unit: str) -> str:
     if elapsed <= 0 or done <= 0:
         return ""
     # seconds of recording per second are what users know as the real-time factor
-    return f"{done / elapsed:.1f} × real time" if unit == "s" else f"{done / elapsed:,.0f} {unit}/s"
+    return f"{done / elapsed:.1f} x real time" if unit == "s" else f"{done / elapsed:,.0f} {unit}/s"
 
 
 def _duration(seconds: float) -> str:

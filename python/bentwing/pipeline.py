@@ -28,7 +28,7 @@ from bentwing.run_record import plain
 from bentwing.trajectory import Trajectory
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 
 ESTIMATORS = ("continuous", "kalman", "ndt")
 AVAILABLE_ESTIMATORS = ("continuous",)
+_NO_LOOP_CLOSURE = "not in this version, the trajectory is open-loop"
 
 
 @dataclass(slots=True)
@@ -103,42 +104,23 @@ def map_recording(
         "estimator": estimator,
         "map_format": map_format,
         "map_spacing": map_spacing,
-        "loop_closure": loop_closure,
+        "loop_closure": _NO_LOOP_CLOSURE if loop_closure else False,
         "threads": threads,
         "start": start,
         "duration": duration,
         **_described(estimator, engine, head),
     }
-    watch = progress or Progress()
     with Recording(paths, head) as recording, RunFolder(Path(out), asked) as folder:
-        run, counts = Run(folder.path), Counter[str]()
-        origin_ns = recording.clock.start_ns
-        total = min(recording.duration - (start or 0.0), duration or np.inf)
+        part, run = _Part(recording, head, start, duration), Run(folder.path)
+        watch = progress or Progress()
         with _reported(folder, run):
             with folder.stage("inputs"):
                 folder.add_inputs(recording.paths)
-            with folder.stage("estimate"), watch.stage("estimate", total) as stage:
-                batches = preprocess(recording.batches(start, duration), head, counts)
-                run.estimate = _estimate(engine, _watched(batches, stage, run), folder, origin_ns)
-            folder.record["counts"].update(recording.counts + counts)
-            folder.record["warnings"] += recording.warnings
-            folder.add_estimate(run.estimate)
-            for name in ("odometry.txt", "trajectory.txt"):
-                folder.write_trajectory(name, run.estimate.trajectory, origin_ns)
-            with folder.stage("map"), watch.stage("map", total) as stage:
-                batches = preprocess(recording.batches(start, duration), head, Counter())
-                chunks = project(
-                    _watched(batches, stage),
-                    run.estimate.trajectory,
-                    run.estimate.calibration,
-                    encoder=head.encoder,
-                    counts=folder.record["counts"],
-                )
-                chunks = thin(chunks, map_spacing, folder.record["counts"])
-                map_path = folder.file(f"map.{map_format}")
-                with open_map(map_path, map_format, origin_ns) as writer:
-                    for chunk in run.sample.watch(chunks):
-                        writer.write(chunk)
+                folder.add_inputs([Path(payload)] if isinstance(payload, (str, Path)) else [])
+            with folder.stage("estimate"), watch.stage("estimate", part.length) as shown:
+                run.estimate = _estimate(engine, part, shown, folder, run)
+            with folder.stage("map"), watch.stage("map", part.length) as shown:
+                _write_map(run, part, shown, folder, map_format=map_format, map_spacing=map_spacing)
             with folder.stage("report"):
                 folder.save()
                 _report(folder, run, complete=True)
@@ -173,34 +155,80 @@ def _loaded(payload: Payload | Path | str | None) -> Payload:
     return Payload.default() if payload is None else Payload.load(payload)
 
 
+@dataclass(frozen=True, slots=True)
+class _Part:
+    """The part of a recording to use, as a stream that can be asked for again."""
+
+    recording: Recording
+    head: Payload
+    start: float | None
+    duration: float | None
+
+    @property
+    def length(self) -> float:
+        """Seconds of the recording to go through."""
+        left = self.recording.duration - (self.start or 0.0)
+        return left if self.duration is None else min(left, self.duration)
+
+    def batches(self, shown: Stage, counts: Counter[str]) -> Iterator[Batch]:
+        """Stream the preprocessed batches, telling the progress."""
+        reached = self.start or 0.0
+        for batch in preprocess(
+            self.recording.batches(self.start, self.duration), self.head, counts
+        ):
+            yield batch
+            if len(batch.times) and batch.times[-1] > reached:
+                shown.advance(float(batch.times[-1]) - reached)
+                reached = float(batch.times[-1])
+
+
 def _estimate(
-    engine: Estimator, batches: Iterable[Batch], folder: RunFolder, origin_ns: int
+    engine: Estimator, part: _Part, shown: Stage, folder: RunFolder, run: Run
 ) -> Estimate:
+    counts, origin_ns = Counter[str](), part.recording.clock.start_ns
     try:
-        for batch in batches:
+        for batch in part.batches(shown, counts):
             engine.feed(batch)
+            if isinstance(batch, ImuBatch) and len(batch.times):
+                run.spin_times.append(float(batch.times.mean()))
+                run.spin_rates.append(float(np.median(np.linalg.norm(batch.gyro, axis=1))))
     except EstimationError:
         # the trajectory up to the failure shows where it went wrong
         with suppress(EstimationError):
             folder.write_trajectory("odometry.txt", engine.result().trajectory, origin_ns)
         raise
-    return engine.result()
+    estimate = engine.result()
+    folder.record["counts"].update(part.recording.counts + counts)
+    folder.record["warnings"] += part.recording.warnings
+    folder.add_estimate(estimate)
+    for name in ("odometry.txt", "trajectory.txt"):
+        folder.write_trajectory(name, estimate.trajectory, origin_ns)
+    return estimate
 
 
-def _watched(batches: Iterable[Batch], stage: Stage, run: Run | None = None) -> Iterator[Batch]:
-    """Pass batches on, telling the progress and noting the rate of turn."""
-    reached: float | None = None
-    for batch in batches:
-        yield batch
-        if not len(batch.times):
-            continue
-        if run is not None and isinstance(batch, ImuBatch):
-            run.spin_times.append(float(batch.times.mean()))
-            run.spin_rates.append(float(np.median(np.linalg.norm(batch.gyro, axis=1))))
-        last = float(batch.times[-1])
-        reached = last if reached is None else reached
-        stage.advance(max(last - reached, 0.0))
-        reached = max(last, reached)
+def _write_map(
+    run: Run,
+    part: _Part,
+    shown: Stage,
+    folder: RunFolder,
+    *,
+    map_format: str,
+    map_spacing: float,
+) -> None:
+    if run.estimate is None:
+        return
+    chunks = project(
+        part.batches(shown, Counter()),  # what is dropped was counted in the first pass
+        run.estimate.trajectory,
+        run.estimate.calibration,
+        encoder=part.head.encoder,
+        counts=folder.record["counts"],
+    )
+    chunks = thin(chunks, map_spacing, folder.record["counts"])
+    path = folder.file(f"map.{map_format}")
+    with open_map(path, map_format, part.recording.clock.start_ns) as writer:
+        for chunk in run.sample.watch(chunks):
+            writer.write(chunk)
 
 
 @contextmanager

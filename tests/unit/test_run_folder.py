@@ -19,7 +19,9 @@ def record_of(out):
 
 
 def estimate():
-    trajectory = Trajectory(np.array([0.0, 0.01]), np.zeros((2, 3)), np.tile([0.0, 0, 0, 1], (2, 1)))
+    trajectory = Trajectory(
+        np.array([0.0, 0.01]), np.zeros((2, 3)), np.tile([0.0, 0, 0, 1], (2, 1))
+    )
     calibration = Calibration(
         0.002, np.zeros(3), np.array([0, 0, 0, 1.0]), np.zeros(3), np.zeros(3), np.array([0, 0, 9.8]),
         std={"latency": [1e-5]},
@@ -56,11 +58,15 @@ def test_a_run_that_ends_well_is_complete_and_names_its_files(tmp_path):
     ],
 )
 def test_a_run_that_stops_keeps_what_it_has_and_says_where_and_why(tmp_path, error, reason):
-    with pytest.raises(type(error)), RunFolder(tmp_path) as run:
-        run.write_trajectory("odometry.txt", estimate().trajectory, 0)
-        with run.stage("map"):
-            run.file("map.laz")
-            raise error
+    def stopping():
+        with RunFolder(tmp_path) as run:
+            run.write_trajectory("odometry.txt", estimate().trajectory, 0)
+            with run.stage("map"):
+                run.file("map.laz")
+                raise error
+
+    with pytest.raises(type(error)):
+        stopping()
     record = record_of(tmp_path)
     assert (record["complete"], record["stage"], record["reason"]) == (False, "map", reason)
     assert record["files"] == ["odometry.txt"]

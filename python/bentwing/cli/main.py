@@ -88,6 +88,8 @@ def run_command(arguments: list[str]) -> int:
         return _fail(f"{where}{error.strerror or error}", 1)
     except Exception as error:
         return _unexpected(error)
+    if result == INTERRUPTED:  # some versions of typer turn the interrupt into its exit code
+        return _fail("interrupted", INTERRUPTED)
     return result if isinstance(result, int) else 0
 
 

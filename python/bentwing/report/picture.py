@@ -6,7 +6,7 @@ from __future__ import annotations
 import struct
 import zlib
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -18,8 +18,11 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+_Scalar = TypeVar("_Scalar", bound=np.generic)
+
 PAPER = 255  # brightness where there is no point
 _ENCLOSED = 3  # filled neighbours of eight
+_RADII = (1, 3)  # pixels over which depth is compared
 _OUTLIERS = 0.1  # percent of the points on each side that may fall off the picture
 _NEIGHBOURS = ((0, 1), (1, 0), (0, -1), (-1, 0), (1, 1), (1, -1), (-1, 1), (-1, -1))
 
@@ -163,13 +166,15 @@ def _front_points(
 
 def _close_gaps(depth: NDArray[np.float64], shade: NDArray[np.float64]) -> None:
     """Give empty pixels enclosed by filled ones the nearest of their neighbours."""
-    filled = np.isfinite(depth)
-    around = [(_shifted(depth, step), _shifted(shade, step)) for step in _NEIGHBOURS]
-    n_filled = np.sum([np.isfinite(d) for d, _ in around], axis=0)
-    nearest = np.max([d for d, _ in around], axis=0)
-    for d, value in around:
-        take = ~filled & (n_filled >= _ENCLOSED) & (d == nearest)
-        depth[take], shade[take] = d[take], value[take]
+    around = np.pad(depth, 1, constant_values=-np.inf)
+    filled = np.isfinite(around).astype(np.uint8)
+    n_filled = sum(_moved(filled, step, 1) for step in _NEIGHBOURS)
+    row, column = np.nonzero(~np.isfinite(depth) & (n_filled >= _ENCLOSED))
+    steps = np.array(_NEIGHBOURS)
+    rows, columns = row + steps[:, :1], column + steps[:, 1:]  # (8, K)
+    nearest = np.argmax(around[rows + 1, columns + 1], axis=0)[None]
+    chosen = np.take_along_axis(rows, nearest, 0)[0], np.take_along_axis(columns, nearest, 0)[0]
+    depth[row, column], shade[row, column] = depth[chosen], shade[chosen]
 
 
 def _eye_dome(depth: NDArray[np.float64], pixel: float) -> NDArray[np.float64]:
@@ -180,21 +185,18 @@ def _eye_dome(depth: NDArray[np.float64], pixel: float) -> NDArray[np.float64]:
     Boucheny 2009, eye-dome lighting, here with two radii and no light direction.
     """
     floor = np.where(np.isfinite(depth), depth, np.inf)  # what is empty is behind nothing
+    around = np.pad(depth, max(_RADII), constant_values=-np.inf)
     hidden = np.zeros_like(depth)
-    for radius in (1, 3):
+    for radius in _RADII:
         for step in _NEIGHBOURS:
-            nearer = _shifted(depth, (radius * step[0], radius * step[1])) - floor
-            hidden += np.clip(nearer / (radius * pixel), 0, 4.0)
+            nearer = _moved(around, (radius * step[0], radius * step[1]), max(_RADII)) - floor
+            nearer /= radius * pixel
+            hidden += np.clip(nearer, 0, 4.0, out=nearer)
     return 0.3 + 0.7 * np.exp(-hidden / 16.0)
 
 
-def _shifted(array: NDArray[np.float64], step: tuple[int, int]) -> NDArray[np.float64]:
-    """Move an array by whole pixels; what comes in is empty."""
-    rows, columns = step
-    moved = np.full_like(array, -np.inf)
-    height, width = array.shape
-    if abs(rows) < height and abs(columns) < width:
-        moved[max(rows, 0) : height + min(rows, 0), max(columns, 0) : width + min(columns, 0)] = (
-            array[max(-rows, 0) : height - max(rows, 0), max(-columns, 0) : width - max(columns, 0)]
-        )
-    return moved
+def _moved(padded: NDArray[_Scalar], step: tuple[int, int], margin: int) -> NDArray[_Scalar]:
+    """View of a padded array from which every pixel sees its neighbour at `step`."""
+    rows, columns = (size - 2 * margin for size in padded.shape)
+    row, column = margin + step[0], margin + step[1]
+    return padded[row : row + rows, column : column + columns]

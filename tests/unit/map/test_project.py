@@ -47,18 +47,24 @@ def undone(translation, quat, points):
 def test_a_fixed_target_seen_while_turning_is_mapped_to_one_place():
     stamps = np.linspace(LATENCY, 1.0 + LATENCY - 1e-9, 1000)
     points = undone(T_IMU_LIDAR, R_IMU_LIDAR, seen_in_imu(stamps))
-    batches = [LidarBatch(p, t) for p, t in zip(np.split(points, 10), np.split(stamps, 10), strict=True)]
+    batches = [
+        LidarBatch(p, t) for p, t in zip(np.split(points, 10), np.split(stamps, 10), strict=True)
+    ]
     chunks = list(project(batches, trajectory(), calibration()))
     assert np.allclose(np.concatenate([c.points for c in chunks]), TARGET, atol=1e-9)
     assert np.allclose(np.concatenate([c.times for c in chunks]), stamps - LATENCY)
-    assert np.allclose(np.concatenate([c.ranges for c in chunks]), np.linalg.norm(points, axis=1), rtol=1e-6)
+    assert np.allclose(
+        np.concatenate([c.ranges for c in chunks]), np.linalg.norm(points, axis=1), rtol=1e-6
+    )
 
 
 def test_a_motor_turned_lidar_goes_through_mount_axis_and_zero():
     stamps, zero = np.linspace(0.1, 0.9, 400), 0.03
     axis = np.array([0.0, 0.6, 0.8])
     mount = SimpleNamespace(translation=(0.1, 0.0, 0.2), quaternion=tuple(R_IMU_LIDAR))
-    lever = SimpleNamespace(translation=(0.0, 0.02, 0.0), quaternion=tuple(geometry.exp(np.array([0, 0.2, 0]))))
+    lever = SimpleNamespace(
+        translation=(0.0, 0.02, 0.0), quaternion=tuple(geometry.exp(np.array([0, 0.2, 0])))
+    )
     encoder = SimpleNamespace(axis=tuple(axis), T_imu_motor=mount, T_motor_lidar=lever)
     angles = 7.0 * stamps
     points = undone(np.array(mount.translation), np.array(mount.quaternion), seen_in_imu(stamps))

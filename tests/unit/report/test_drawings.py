@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
 import struct
 import zlib
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -76,9 +77,11 @@ def test_no_point_gives_an_empty_picture():
 
 def test_points_above_the_sensor_are_left_out_only_under_a_roof():
     rng = np.random.default_rng(0)
-    trajectory = Trajectory(np.array([0.0, 1.0]), np.array([[0, 0, 1.0], [1, 0, 1.0]]), np.tile([0.0, 0, 0, 1], (2, 1)))
+    trajectory = Trajectory(
+        np.array([0.0, 1.0]), np.array([[0, 0, 1.0], [1, 0, 1.0]]), np.tile([0.0, 0, 0, 1], (2, 1))
+    )
     floor = rng.uniform([-5, -5, -0.01], [5, 5, 0.01], (1000, 3))
-    roof = floor + [0, 0, 2.5]
+    roof = np.add(floor, [0, 0, 2.5])
     times = rng.uniform(0, 1, 2000)
     marked = overhead_points(np.vstack([floor, roof]), times, trajectory)
     assert np.array_equal(marked, np.arange(2000) >= 1000)
@@ -90,7 +93,7 @@ def test_points_above_the_sensor_are_left_out_only_under_a_roof():
 def test_ticks_are_round_rising_and_inside(low, span, n):
     ticks = nice_ticks(low, low + span, n)
     assert 1 <= len(ticks) <= 2 * n + 2
-    assert all(b > a for a, b in zip(ticks, ticks[1:], strict=False))
+    assert all(b > a for a, b in pairwise(ticks))
     assert low - span <= ticks[0]
     assert ticks[-1] <= low + 2 * span
 

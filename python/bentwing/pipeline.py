@@ -23,6 +23,7 @@ from bentwing.progress import Progress
 from bentwing.recording import ImuBatch, Payload, Recording
 from bentwing.report import write_report
 from bentwing.report.picture import render_top, write_png
+from bentwing.report.views import overhead_points
 from bentwing.run_folder import RunFolder
 from bentwing.run_record import plain
 from bentwing.trajectory import Trajectory
@@ -258,7 +259,8 @@ def _report(folder: RunFolder, run: Run, *, complete: bool) -> None:
         spin=spin if len(spin[0]) else None,
     )
     if len(points):
-        write_png(folder.file("map_top.png"), render_top(points))
+        overhead = overhead_points(points, run.sample.times, trajectory)
+        write_png(folder.file("map_top.png"), render_top(points[~overhead]))
 
 
 _NO_TRAJECTORY = Trajectory(np.empty(0), np.empty((0, 3)), np.empty((0, 4)))

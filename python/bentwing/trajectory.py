@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 _NS = 1_000_000_000
 _TUM_COLUMNS = 8
+_BLOCK = 16384  # points at a time, so that the intermediate arrays stay in the cache
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,9 +99,12 @@ class Trajectory:
         -------
         (N, 3) float64, m, map frame
         """
-        positions, quats = self.interpolate(times)
-        positions += geometry.rotate(quats, points_imu)
-        return positions
+        points = np.empty((len(times), 3))
+        for start in range(0, len(times), _BLOCK):
+            block = slice(start, start + _BLOCK)
+            positions, quats = self.interpolate(times[block])
+            np.add(positions, geometry.rotate(quats, points_imu[block]), out=points[block])
+        return points
 
     def write_tum(self, path: Path, clock_origin_ns: int) -> None:
         """Write `t x y z qx qy qz qw` with absolute stamps that are exact to the nanosecond.

@@ -99,8 +99,17 @@ def _legend(
     return [
         f'<defs><linearGradient id="{identity}">{stops}</linearGradient></defs>',
         f'<rect x="{right - 260}" y="{y}" width="256" height="10" rx="2" fill="url(#{identity})"/>',
-        text(right - 260, y + 16 + text_size, f"{view.low:.1f}", "start", INK, text_size),
-        text(right - 4, y + 16 + text_size, f"{view.high:.1f}", "end", INK, text_size),
+        text(
+            right - 260,
+            y + 16 + text_size,
+            f"{round(view.low, 1) + 0.0:.1f}",
+            "start",
+            INK,
+            text_size,
+        ),
+        text(
+            right - 4, y + 16 + text_size, f"{round(view.high, 1) + 0.0:.1f}", "end", INK, text_size
+        ),
         text(right - 132, y + 16 + text_size, label, "middle", FAINT, text_size),
     ]
 

@@ -4,12 +4,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from decimal import Decimal, InvalidOperation
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bentwing import geometry
+from bentwing.atomic import write_text
+from bentwing.errors import InputError
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+_NS = 1_000_000_000
+_TUM_COLUMNS = 8
+_BLOCK = 16384  # points at a time, so that the intermediate arrays stay in the cache
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,3 +48,155 @@ class Trajectory:
         if n and not np.all(np.diff(self.times) > 0):
             msg = f"trajectory: times must increase, sample {int(np.argmin(np.diff(self.times))) + 1} does not"
             raise ValueError(msg)
+
+    def covers(self, times: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Whether each of `times` `(N,)` lies between the first and the last pose."""
+        if not len(self.times):
+            return np.zeros(len(times), dtype=np.bool_)
+        inside: NDArray[np.bool_] = (times >= self.times[0]) & (times <= self.times[-1])
+        return inside
+
+    def interpolate(
+        self, times: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Poses at any times: p linear, R slerped between the neighbouring samples.
+
+        Parameters
+        ----------
+        times : (N,) float64, s since the recording's start, in any order
+
+        Returns
+        -------
+        positions : (N, 3) float64, m, map frame
+        quats_xyzw : (N, 4) float64
+
+        Raises
+        ------
+        ValueError
+            If a time is outside the trajectory; `covers` says which ones are inside.
+        """
+        times = np.asarray(times, dtype=np.float64)
+        self._require_cover(times)
+        if len(self.times) == 1:
+            return self.positions.repeat(len(times), 0), self.quats_xyzw.repeat(len(times), 0)
+        i = np.clip(np.searchsorted(self.times, times, side="right") - 1, 0, len(self.times) - 2)
+        shares = (times - self.times[i]) / (self.times[i + 1] - self.times[i])
+        p = self.positions
+        positions = p[i] + shares[:, None] * (p[i + 1] - p[i])
+        return positions, geometry.slerp(self.quats_xyzw[i], self.quats_xyzw[i + 1], shares)
+
+    def transform_points(
+        self, points_imu: NDArray[np.float64], times: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Bring points, each seen at its own time, from the moving IMU frame into the map.
+
+        Parameters
+        ----------
+        points_imu : (N, 3) float64, m, imu frame at the time of each
+        times : (N,) float64, s since the recording's start, IMU clock
+
+        Returns
+        -------
+        (N, 3) float64, m, map frame
+        """
+        points = np.empty((len(times), 3))
+        for start in range(0, len(times), _BLOCK):
+            block = slice(start, start + _BLOCK)
+            positions, quats = self.interpolate(times[block])
+            np.add(positions, geometry.rotate(quats, points_imu[block]), out=points[block])
+        return points
+
+    def write_tum(self, path: Path, clock_origin_ns: int) -> None:
+        """Write `t x y z qx qy qz qw` with absolute stamps that are exact to the nanosecond.
+
+        Parameters
+        ----------
+        path : file to write, atomically
+        clock_origin_ns : absolute time of `times == 0`, ns UTC
+        """
+        stamps_ns = clock_origin_ns + np.rint(self.times * _NS).astype(np.int64)
+        poses = np.hstack([self.positions, self.quats_xyzw])
+        lines = [
+            f"{_seconds(stamp)} {x:.6f} {y:.6f} {z:.6f} {qx:.9f} {qy:.9f} {qz:.9f} {qw:.9f}\n"
+            for stamp, (x, y, z, qx, qy, qz, qw) in zip(
+                stamps_ns.tolist(), poses.tolist(), strict=True
+            )
+        ]
+        write_text(Path(path), "".join(lines))
+
+    def _require_cover(self, times: NDArray[np.float64]) -> None:
+        outside = ~self.covers(times)
+        if outside.any():
+            first = int(np.argmax(outside))
+            span = (
+                f"{self.times[0]:.3f} to {self.times[-1]:.3f} s" if len(self.times) else "no pose"
+            )
+            msg = f"times: {times[first]:.6f} s in row {first} is outside the trajectory ({span})"
+            raise ValueError(msg)
+
+
+def read_tum(path: Path, clock_origin_ns: int | None = None) -> tuple[Trajectory, int]:
+    """Read a trajectory of lines `t x y z qx qy qz qw`; lines that start with # are comments.
+
+    Parameters
+    ----------
+    path : file to read
+    clock_origin_ns : absolute time that becomes zero, ns UTC; default: the first stamp
+
+    Returns
+    -------
+    trajectory : times in s since the origin
+    clock_origin_ns : the origin
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, a line has no eight numbers, or the stamps do not increase.
+    """
+    stamps_ns, poses = _parse_tum(Path(path))
+    origin = stamps_ns[0] if clock_origin_ns is None else clock_origin_ns
+    relative_ns = np.array([stamp - origin for stamp in stamps_ns], dtype=np.int64)
+    late = np.diff(relative_ns) <= 0
+    if late.any():
+        msg = f"{path}: stamps must increase, pose {int(np.argmax(late)) + 2} does not"
+        raise InputError(msg)
+    values = np.array(poses)
+    lengths = np.linalg.norm(values[:, 3:], axis=1, keepdims=True)
+    if not np.isfinite(values).all() or (lengths == 0).any():
+        msg = f"{path}: a pose is not finite or has a quaternion of length zero"
+        raise InputError(msg)
+    return Trajectory(relative_ns / _NS, values[:, :3].copy(), values[:, 3:] / lengths), origin
+
+
+def _parse_tum(path: Path) -> tuple[list[int], list[list[float]]]:
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        msg = f"{path}: not readable as a trajectory ({error})"
+        raise InputError(msg) from error
+    stamps_ns: list[int] = []
+    poses: list[list[float]] = []
+    for number, line in enumerate(lines, start=1):
+        fields = line.replace(",", " ").split()
+        if not fields or fields[0].startswith("#"):
+            continue
+        try:
+            stamp, *pose = fields[:_TUM_COLUMNS]
+            stamps_ns.append(int((Decimal(stamp) * _NS).to_integral_value()))
+            poses.append([float(value) for value in pose])
+            complete = len(pose) == _TUM_COLUMNS - 1
+        except (InvalidOperation, ValueError, OverflowError):
+            complete = False
+        if not complete:
+            msg = f"{path}, line {number}: expected `t x y z qx qy qz qw`, found {line[:80]!r}"
+            raise InputError(msg)
+    if not stamps_ns:
+        msg = f"{path}: holds no pose; expected lines of `t x y z qx qy qz qw`"
+        raise InputError(msg)
+    return stamps_ns, poses
+
+
+def _seconds(stamp_ns: int) -> str:
+    sign = "-" if stamp_ns < 0 else ""
+    seconds, nanoseconds = divmod(abs(stamp_ns), _NS)
+    return f"{sign}{seconds}.{nanoseconds:09d}"

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""map"""
+"""The map: points of a recording brought into one frame, thinned and written to a file."""

@@ -1,2 +1,6 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""report"""
+"""The report: what a run found, as one page that opens anywhere."""
+
+from bentwing.report.page import write_report
+
+__all__ = ["write_report"]

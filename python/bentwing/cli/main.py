@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""The command `bentwing`: options, commands, and one place where errors become exit codes."""
+
+from __future__ import annotations
+
+import os
+import sys
+import traceback
+from typing import Annotated
+
+import typer
+
+from bentwing.cli.info import info
+from bentwing.cli.map import map_command
+from bentwing.cli.simulate import simulate_command
+from bentwing.errors import BentwingError
+
+INTERRUPTED = 130
+_UNEXPECTED = 70  # EX_SOFTWARE of sysexits.h
+_DEBUG = "BENTWING_DEBUG"
+
+# typer carries its own copy of click in some versions; the base of its errors is found through
+# the one class it has always shown.
+_CommandLineError: type[Exception] = next(
+    base for base in typer.BadParameter.__mro__ if base.__name__ == "ClickException"
+)
+
+app = typer.Typer(
+    name="bentwing",
+    help="Accurate trajectories and 3D maps from lidars that move on their carrier, without GNSS.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+# The modules of the commands import what they need when they run, so that --help is fast.
+app.command("map")(map_command)
+app.command("info")(info)
+app.command("simulate")(simulate_command)
+
+
+def _print_version(wanted: bool) -> None:  # noqa: FBT001 - typer calls it so
+    if wanted:
+        from bentwing.run_record import bentwing_version
+
+        typer.echo(f"bentwing {bentwing_version()}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    *,
+    version: Annotated[
+        bool,
+        typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version."),
+    ] = False,
+    debug: Annotated[
+        bool, typer.Option("--debug", help="Show tracebacks of unexpected errors.")
+    ] = False,
+) -> None:
+    del version
+    if debug:
+        os.environ[_DEBUG] = "1"
+
+
+def run() -> None:
+    """Run the command line and end the process with its exit code."""
+    sys.exit(run_command(sys.argv[1:]))
+
+
+def run_command(arguments: list[str]) -> int:
+    """Run one command; return its exit code, having said in one sentence what went wrong."""
+    try:
+        result = app(arguments, standalone_mode=False)
+    except BentwingError as error:
+        return _fail(str(error), error.exit_code)
+    except _CommandLineError as error:
+        message = getattr(error, "format_message", error.__str__)()
+        # bare `bentwing` raises an error whose message is the help
+        return _fail(f"{message.rstrip('.')}; see `bentwing --help`" if message else "", 2)
+    except (KeyboardInterrupt, typer.Abort):
+        return _fail("interrupted", INTERRUPTED)
+    except BrokenPipeError:
+        # the reader of our output has gone; nothing more can be said
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except OSError as error:
+        where = f"{error.filename}: " if error.filename else ""
+        return _fail(f"{where}{error.strerror or error}", 1)
+    except Exception as error:
+        return _unexpected(error)
+    if result == INTERRUPTED:  # some versions of typer turn the interrupt into its exit code
+        return _fail("interrupted", INTERRUPTED)
+    return result if isinstance(result, int) else 0
+
+
+def _fail(message: str, code: int) -> int:
+    if message:
+        print(f"bentwing: error: {message}", file=sys.stderr)
+    return code
+
+
+def _unexpected(error: Exception) -> int:
+    if os.environ.get(_DEBUG):
+        traceback.print_exception(error)
+    _fail(
+        f"unexpected {type(error).__name__}: {error}; this is a bug in bentwing, please report it "
+        f"with the output of the same command under {_DEBUG}=1",
+        _UNEXPECTED,
+    )
+    return _UNEXPECTED

@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""`bentwing map`: from a recording to a trajectory, a map and a report."""
+
+from __future__ import annotations
+
+from pathlib import Path  # noqa: TC003 - typer reads the annotations
+from typing import Annotated
+
+import typer
+
+
+def map_command(
+    recording: Annotated[list[Path], typer.Argument(help="Recording, or its consecutive parts.")],
+    *,
+    out: Annotated[Path, typer.Option("-o", "--out", help="Folder to write into.")],
+    payload: Annotated[
+        Path | None, typer.Option(help="payload.yaml, the description of the sensor head.")
+    ] = None,
+    estimator: Annotated[str, typer.Option(help="continuous, kalman or ndt.")] = "continuous",
+    map_format: Annotated[str, typer.Option(help="laz, las, ply, pcd or e57.")] = "laz",
+    map_spacing: Annotated[
+        float, typer.Option(help="Keep one point per voxel of this edge in metres; 0 keeps all.")
+    ] = 0.0,
+    no_loop_closure: Annotated[
+        bool, typer.Option("--no-loop-closure", help="Leave the trajectory open-loop.")
+    ] = False,
+    threads: Annotated[int | None, typer.Option(help="Default: all cores.", min=1)] = None,
+    start: Annotated[
+        float | None, typer.Option(help="Seconds to skip at the start.", min=0)
+    ] = None,
+    duration: Annotated[
+        float | None, typer.Option(help="Seconds of the recording to use.", min=0)
+    ] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", help="Say nothing but errors.")] = False,
+    print_settings: Annotated[
+        bool, typer.Option("--print-settings", help="Show the settings and stop.")
+    ] = False,
+) -> None:
+    """Turn a recording into a trajectory, a map and a report."""
+    from bentwing import pipeline
+    from bentwing.progress import create_progress
+
+    if print_settings:
+        typer.echo(pipeline.settings_text(estimator, payload))
+        return
+    pipeline.map_recording(
+        recording,
+        payload,
+        out,
+        estimator=estimator,
+        map_format=map_format,
+        map_spacing=map_spacing,
+        loop_closure=not no_loop_closure,
+        threads=threads,
+        start=start,
+        duration=duration,
+        progress=create_progress(quiet=quiet),
+    )
+    if not quiet:
+        typer.echo(f"{out}: open {out / 'report.html'}")

@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""Bring an estimate and the truth to common times and a common frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bentwing import geometry
+from bentwing.errors import InputError
+from bentwing.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+_FEWEST = 3  # poses that fix an alignment
+
+
+@dataclass(frozen=True, slots=True)
+class Alignment:
+    """Rigid motion from the frame of the estimate to that of the truth: `R p + t`."""
+
+    R: NDArray[np.float64]
+    t: NDArray[np.float64]
+
+    def apply(self, trajectory: Trajectory) -> Trajectory:
+        """Move a whole trajectory."""
+        turned = geometry.multiply(geometry.from_matrices(self.R), trajectory.quats_xyzw)
+        return Trajectory(trajectory.times, trajectory.positions @ self.R.T + self.t, turned)
+
+
+def associate(
+    estimate: Trajectory, truth: Trajectory, during: tuple[float, float] | None = None
+) -> tuple[Trajectory, Trajectory]:
+    """Interpolate the estimate at the stamps of the truth, where both exist.
+
+    Parameters
+    ----------
+    estimate, truth : on the same clock
+    during : s, first and last time to compare, for instance those in flight
+
+    Raises
+    ------
+    InputError
+        If fewer than three poses remain.
+    """
+    chosen = estimate.covers(truth.times)
+    if during is not None:
+        chosen &= (truth.times >= during[0]) & (truth.times <= during[1])
+    if np.count_nonzero(chosen) < _FEWEST:
+        msg = (
+            f"the estimate {_span(estimate)} and the truth {_span(truth)} share "
+            f"{np.count_nonzero(chosen)} stamps{'' if during is None else ' in the given interval'}; "
+            "at least 3 are needed, on the same clock"
+        )
+        raise InputError(msg)
+    times = truth.times[chosen]
+    return (
+        Trajectory(times, *estimate.interpolate(times)),
+        Trajectory(times, truth.positions[chosen], truth.quats_xyzw[chosen]),
+    )
+
+
+def align(
+    points: NDArray[np.float64], targets: NDArray[np.float64], *, yaw_only: bool = False
+) -> Alignment:
+    """Find the rigid motion, without scale, that brings points nearest to their targets.
+
+    Parameters
+    ----------
+    points, targets : (N, 3) m
+    yaw_only : turn about z only, so that an error of levelling counts
+
+    References
+    ----------
+    Umeyama 1991, eqs. (34) to (43) with c = 1.
+    """
+    p, q = points - points.mean(axis=0), targets - targets.mean(axis=0)
+    if yaw_only:
+        yaw = np.arctan2(np.sum(p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]), np.sum(p[:, :2] * q[:, :2]))
+        R = geometry.to_matrices(geometry.exp(np.array([0.0, 0.0, yaw])))
+    else:
+        u, _, vt = np.linalg.svd(q.T @ p)
+        mirror = np.diag([1.0, 1.0, np.sign(np.linalg.det(u) * np.linalg.det(vt))])
+        R = u @ mirror @ vt
+    return Alignment(R, targets.mean(axis=0) - R @ points.mean(axis=0))
+
+
+def without_frame_rotation(estimate: Trajectory, truth: Trajectory) -> Trajectory:
+    """Remove from an aligned estimate the constant rotation of its IMU frame.
+
+    A constant error of the extrinsics turns the body frame and neither the path nor the map, but
+    measures that align segments by orientation would read it as drift.
+
+    Parameters
+    ----------
+    estimate, truth : at the same times, in the same frame
+    """
+    offsets = geometry.multiply(geometry.inverse(truth.quats_xyzw), estimate.quats_xyzw)
+    correction = geometry.inverse(geometry.mean_rotation(offsets))
+    return Trajectory(
+        estimate.times, estimate.positions, geometry.multiply(estimate.quats_xyzw, correction)
+    )
+
+
+def _span(trajectory: Trajectory) -> str:
+    if not len(trajectory.times):
+        return "(no pose)"
+    return f"({trajectory.times[0]:.1f} to {trajectory.times[-1]:.1f} s)"

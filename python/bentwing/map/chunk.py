@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""A piece of the map, small enough to pass from the projection to the writers one by one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, slots=True)
+class MapChunk:
+    """Points of the map in the order in which they were measured.
+
+    Attributes
+    ----------
+    points : (N, 3) float64, m, map frame
+    times : (N,) float64, s since the recording's start, IMU clock
+    ranges : (N,) float32, m, distance from the lidar
+    intensity : (N,) float32 or None, as the sensor reports it
+    ring : (N,) uint16 or None, beam number
+    """
+
+    points: NDArray[np.float64]
+    times: NDArray[np.float64]
+    ranges: NDArray[np.float32]
+    intensity: NDArray[np.float32] | None = None
+    ring: NDArray[np.uint16] | None = None
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    def where(self, keep: NDArray[np.bool_] | slice) -> MapChunk:
+        """Return the points selected by a mask or a slice."""
+        return MapChunk(
+            self.points[keep],
+            self.times[keep],
+            self.ranges[keep],
+            None if self.intensity is None else self.intensity[keep],
+            None if self.ring is None else self.ring[keep],
+        )

@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""The rows of the self-describing formats, and headers whose length does not depend on the count."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from bentwing.map.chunk import MapChunk
+
+_LARGEST_COUNT = 10**15
+
+
+def row_type(first: MapChunk, coordinate: str) -> np.dtype[np.void]:
+    """Packed little-endian row: x y z (of type `coordinate`), time, range, intensity, ring."""
+    fields = [
+        ("x", coordinate),
+        ("y", coordinate),
+        ("z", coordinate),
+        ("time", "<f8"),
+        ("range", "<f4"),
+    ]
+    if first.intensity is not None:
+        fields.append(("intensity", "<f4"))
+    if first.ring is not None:
+        fields.append(("ring", "<u2"))
+    return np.dtype(fields)
+
+
+def rows(chunk: MapChunk, dtype: np.dtype[np.void]) -> NDArray[np.void]:
+    """Rows `(N,)` of a chunk; what it does not have is zero."""
+    table = np.zeros(len(chunk), dtype)
+    for axis, name in enumerate("xyz"):
+        table[name] = chunk.points[:, axis]
+    table["time"], table["range"] = chunk.times, chunk.ranges
+    for name, values in (("intensity", chunk.intensity), ("ring", chunk.ring)):
+        if values is not None and name in (dtype.names or ()):
+            table[name] = values
+    return table
+
+
+def fixed_length_header(build: Callable[[int, str], str], count: int) -> bytes:
+    """Header of the same length for every count, so that it can be written again at the end.
+
+    Parameters
+    ----------
+    build : makes the header from the count and a filling of dots, to be put in a comment
+    count : number of points
+    """
+    length = len(build(_LARGEST_COUNT, ""))
+    return build(count, "." * (length - len(build(count, "")))).encode("ascii")

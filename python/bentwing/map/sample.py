@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""An even sample of a map of unknown size, for pictures and statistics."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from numpy.typing import NDArray
+
+    from bentwing.map.chunk import MapChunk
+
+
+class MapSample:
+    """Every k-th point of what passes by, k doubled whenever more than `limit` were kept.
+
+    Parameters
+    ----------
+    limit : the sample holds at most this many points, and at least half as many if there were
+    """
+
+    def __init__(self, limit: int = 2_000_000) -> None:
+        self._limit = limit
+        self._step = 1
+        self._next = 0  # how many points still pass before the next is kept
+        self._points: list[NDArray[np.float64]] = []
+        self._times: list[NDArray[np.float64]] = []
+        self._n = 0
+
+    @property
+    def points(self) -> NDArray[np.float64]:
+        """Sampled points, (K, 3) m, map frame."""
+        return np.concatenate(self._points) if self._points else np.empty((0, 3))
+
+    @property
+    def times(self) -> NDArray[np.float64]:
+        """Times of the sampled points, (K,) s since the recording's start."""
+        return np.concatenate(self._times) if self._times else np.empty(0)
+
+    def watch(self, chunks: Iterable[MapChunk]) -> Iterator[MapChunk]:
+        """Pass a stream of chunks on unchanged, sampling it."""
+        for chunk in chunks:
+            self.add(chunk)
+            yield chunk
+
+    def add(self, chunk: MapChunk) -> None:
+        """Take the share of a chunk that belongs to the sample."""
+        chosen = slice(self._next, None, self._step)
+        taken = chunk.points[chosen]
+        self._next += len(taken) * self._step - len(chunk)
+        self._points.append(taken.copy())
+        self._times.append(chunk.times[chosen].copy())
+        self._n += len(taken)
+        while self._n > self._limit:
+            self._halve()
+
+    def _halve(self) -> None:
+        points, times = self.points[::2], self.times[::2]
+        if self._n % 2:  # the last point stayed, so the next one is a whole new step away
+            self._next += self._step
+        self._step *= 2
+        self._points, self._times, self._n = [points], [times], len(points)

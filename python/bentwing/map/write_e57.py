@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""E57 maps through the optional package pye57."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bentwing.errors import UsageError
+from bentwing.map.writer import MapWriter
+
+if TYPE_CHECKING:
+    from bentwing.map.chunk import MapChunk
+
+# pye57 writes one scan per call; a map is a few large scans so that memory stays bounded.
+POINTS_PER_SCAN = 5_000_000
+
+
+def require_pye57() -> Any:  # noqa: ANN401 - the package has no types
+    """Import pye57.
+
+    Raises
+    ------
+    UsageError
+        If it is not installed.
+    """
+    try:
+        import pye57
+    except ImportError:
+        msg = "E57 maps need the package pye57, which is not installed; run `pip install bentwing[e57]`"
+        raise UsageError(msg) from None
+    return pye57
+
+
+class E57Writer(MapWriter):
+    """Writer of E57, as scans of `POINTS_PER_SCAN` points in one frame."""
+
+    def _begin(self, first: MapChunk) -> None:
+        pye57 = require_pye57()
+        self._has_intensity = first.intensity is not None
+        self._file = pye57.E57(str(self._temporary), mode="w")
+        self._waiting: list[MapChunk] = []
+        self._n_waiting = 0
+
+    def _append(self, chunk: MapChunk) -> None:
+        self._waiting.append(chunk)
+        self._n_waiting += len(chunk)
+        if self._n_waiting >= POINTS_PER_SCAN:
+            self._write_scan()
+
+    def _finish(self) -> None:
+        if self._n_waiting:
+            self._write_scan()
+        self._file.close()
+
+    def _abandon(self) -> None:
+        self._file.close()
+
+    def _write_scan(self) -> None:
+        points = np.concatenate([chunk.points for chunk in self._waiting])
+        columns = {f"cartesian{axis}": points[:, i].copy() for i, axis in enumerate("XYZ")}
+        if self._has_intensity:
+            intensity = [
+                np.zeros(len(chunk), np.float32) if chunk.intensity is None else chunk.intensity
+                for chunk in self._waiting
+            ]
+            columns["intensity"] = np.concatenate(intensity)
+        self._file.write_scan_raw(columns, name="bentwing map")
+        self._waiting, self._n_waiting = [], 0

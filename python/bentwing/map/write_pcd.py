@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""Binary PCD 0.7 maps, coordinates in single precision as PCL reads them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from bentwing.map.columns import fixed_length_header, row_type, rows
+from bentwing.map.writer import MapWriter
+
+if TYPE_CHECKING:
+    from bentwing.map.chunk import MapChunk
+
+
+class PcdWriter(MapWriter):
+    """Writer of PCD; `time` is in s since the recording's start, whose stamp is in a comment."""
+
+    def _begin(self, first: MapChunk) -> None:
+        self._dtype = row_type(first, "<f4")
+        self._file = self._temporary.open("wb")
+        self._file.write(self._header())
+
+    def _append(self, chunk: MapChunk) -> None:
+        self._file.write(rows(chunk, self._dtype).tobytes())
+
+    def _finish(self) -> None:
+        self._file.seek(0)
+        self._file.write(self._header())
+        self._file.close()
+
+    def _abandon(self) -> None:
+        self._file.close()
+
+    def _header(self) -> bytes:
+        names = self._dtype.names or ()
+        types = [self._dtype[name] for name in names]
+
+        def build(count: int, filling: str) -> str:
+            lines = [
+                "# .PCD v0.7 - Point Cloud Data file format",
+                f"# bentwing map, metres, z up {filling}",
+                f"# time 0 is {self.clock_origin_ns} ns UTC",
+                "VERSION 0.7",
+                f"FIELDS {' '.join(names)}",
+                f"SIZE {' '.join(str(kind.itemsize) for kind in types)}",
+                f"TYPE {' '.join(kind.kind.upper() for kind in types)}",
+                f"COUNT {' '.join('1' for _ in types)}",
+                f"WIDTH {count}",
+                "HEIGHT 1",
+                "VIEWPOINT 0 0 0 1 0 0 0",
+                f"POINTS {count}",
+                "DATA binary",
+                "",
+            ]
+            return "\n".join(lines)
+
+        return fixed_length_header(build, self.n_points)

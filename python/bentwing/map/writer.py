@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""What all map writers share: fed chunk by chunk, visible under the final name only when whole."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from importlib import import_module
+from typing import TYPE_CHECKING, cast
+
+import numpy as np
+
+from bentwing.atomic import publish, temporary_name
+from bentwing.errors import UsageError
+from bentwing.map.chunk import MapChunk
+
+if TYPE_CHECKING:
+    from pathlib import Path
+    from types import TracebackType
+
+    from typing_extensions import Self
+
+_WRITERS = {
+    "laz": "write_las.LazWriter",
+    "las": "write_las.LasWriter",
+    "ply": "write_ply.PlyWriter",
+    "pcd": "write_pcd.PcdWriter",
+    "e57": "write_e57.E57Writer",
+}
+MAP_FORMATS = tuple(_WRITERS)
+
+
+class MapWriter(ABC):
+    """Context manager that writes one map file.
+
+    The columns are those of the first chunk. On an exception inside the context the temporary
+    file is removed, and whatever stood under the final name stays as it was.
+
+    Parameters
+    ----------
+    path : the final name
+    clock_origin_ns : absolute time of `times == 0`, ns UTC
+    """
+
+    def __init__(self, path: Path, clock_origin_ns: int) -> None:
+        self.path = path
+        self.clock_origin_ns = clock_origin_ns
+        self.n_points = 0
+        self._temporary = temporary_name(path)
+        self._open = False
+
+    def __enter__(self) -> Self:
+        return self
+
+    def write(self, chunk: MapChunk) -> None:
+        """Append the points of a chunk."""
+        if not self._open:
+            self._begin(chunk)
+            self._open = True
+        self._append(chunk)
+        self.n_points += len(chunk)
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        try:
+            if kind is None:
+                if not self._open:
+                    self.write(_EMPTY)
+                self._finish()
+                publish(self._temporary, self.path)
+            elif self._open:
+                self._abandon()
+        finally:
+            self._temporary.unlink(missing_ok=True)
+
+    @abstractmethod
+    def _begin(self, first: MapChunk) -> None:
+        """Open the temporary file and write what stands before the points."""
+
+    @abstractmethod
+    def _append(self, chunk: MapChunk) -> None:
+        """Write the points of a chunk."""
+
+    @abstractmethod
+    def _finish(self) -> None:
+        """Write what is known only at the end and close the file."""
+
+    @abstractmethod
+    def _abandon(self) -> None:
+        """Close the file without caring for its content."""
+
+
+def open_map(path: Path, map_format: str, clock_origin_ns: int) -> MapWriter:
+    """Writer of a map in one of `MAP_FORMATS`.
+
+    Raises
+    ------
+    UsageError
+        If the format is unknown or needs a package that is not installed.
+    """
+    require_format(map_format)
+    module, name = _WRITERS[map_format].split(".")
+    writer = getattr(import_module(f"bentwing.map.{module}"), name)
+    return cast("MapWriter", writer(path, clock_origin_ns))
+
+
+def require_format(map_format: str) -> None:
+    """Refuse a format that cannot be written, before the hours of work that come first."""
+    if map_format not in _WRITERS:
+        msg = f"map format {map_format!r} is not known; choose one of {', '.join(MAP_FORMATS)}"
+        raise UsageError(msg)
+    if map_format == "e57":
+        import_module("bentwing.map.write_e57").require_pye57()
+
+
+_EMPTY = MapChunk(np.empty((0, 3)), np.empty(0), np.empty(0, np.float32))

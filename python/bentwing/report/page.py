@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""report.html: one file that shows what a run found and opens anywhere, without a network."""
+
+from __future__ import annotations
+
+from html import escape
+from importlib.resources import files
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bentwing.atomic import write_text
+from bentwing.report import sections
+from bentwing.report.calibration import calibration_table
+from bentwing.report.plot import Series, line_plot
+from bentwing.report.views import SLAB, draw_views
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from bentwing.trajectory import Trajectory
+
+Spin = tuple["NDArray[np.float64]", "NDArray[np.float64]"]
+
+
+def write_report(
+    path: Path,
+    *,
+    run_json: Mapping[str, Any],
+    trajectory: Trajectory,
+    map_sample: tuple[NDArray[np.float64], NDArray[np.float64]],
+    spin: Spin | None = None,
+) -> None:
+    """Write the report of a run.
+
+    Parameters
+    ----------
+    path : file to write, atomically
+    run_json : the record of the run, as in run.json
+    trajectory : of the IMU in the map; may be empty after a failure
+    map_sample : points (N, 3) m in the map and their times (N,) s; may be empty
+    spin : times (M,) s and rate of turn (M,) rad/s of the sensor head
+    """
+    points, times = map_sample
+    title = f"Mapping report · {_subject(run_json)}"
+    parts = [
+        _header(title, run_json),
+        sections.verdict(run_json),
+        sections.tiles(run_json, trajectory, points),
+        _maps(points, times, trajectory),
+        _motion(trajectory, spin),
+        _windows(run_json.get("windows") or []),
+        f"<h2>Calibration of the sensor head</h2>{calibration_table(run_json.get('calibration'))}",
+        _record(run_json),
+    ]
+    style = files("bentwing.report").joinpath("style.css").read_text(encoding="utf-8")
+    page = (
+        '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f"<title>{escape(title)}</title><style>{style}</style></head>"
+        f"<body><main>{''.join(parts)}</main></body></html>\n"
+    )
+    write_text(path, page)
+
+
+def _subject(record: Mapping[str, Any]) -> str:
+    names = [str(item["name"]) for item in record.get("inputs") or []]
+    recordings = [name for name in names if not name.endswith((".yaml", ".yml"))]
+    return ", ".join(recordings[:3]) + (" …" if len(recordings) > 3 else "") or "recording"
+
+
+def _header(title: str, record: Mapping[str, Any]) -> str:
+    version = (record.get("versions") or {}).get("bentwing", "")
+    started = str(record.get("started") or "").replace("T", " ").replace("+00:00", " UTC")
+    return f"<header><h1>{escape(title)}</h1><p>bentwing {escape(version)} · {escape(started)}</p></header>"
+
+
+def _maps(points: NDArray[np.float64], times: NDArray[np.float64], trajectory: Trajectory) -> str:
+    if not len(points):
+        return '<h2>Map</h2><p class="none">No points were mapped.</p>'
+    views = draw_views(points, times, trajectory)
+    figures = [
+        _figure(views.oblique, "Oblique view", "coloured by height", wide=True),
+        _figure(views.plan_height, "Plan", f"by height, with the path of the sensor (circle: start). {views.plan_note}"),
+        _figure(views.plan_time, "Plan by time", "colours side by side that differ strongly are places seen again later; doubled walls there would be drift."),
+        _figure(views.side, "Side view", "along the longer extent of the map", wide=True),
+        _figure(views.section, "Section", f"{SLAB:g} m thick, through the middle of the path", wide=True),
+    ]  # fmt: skip
+    return f'<h2>Map</h2><div class="grid">{"".join(figures)}</div>'
+
+
+def _motion(trajectory: Trajectory, spin: Spin | None) -> str:
+    t, p = trajectory.times, trajectory.positions
+    position = line_plot([Series(n, t, p[:, i]) for i, n in enumerate("xyz")], "time, s", "position, m")  # fmt: skip
+    steps = slice(None, None, 10)  # speeds over a tenth of a second, without the vibration
+    speed = np.linalg.norm(np.diff(p[steps], axis=0), axis=1) / np.maximum(np.diff(t[steps]), 1e-9)
+    figures = [
+        _figure(position, "Position", "of the IMU in the map"),
+        _figure(line_plot([Series("speed", t[steps][1:], speed)], "time, s", "speed, m/s"), "Speed"),
+    ]  # fmt: skip
+    if spin is not None:
+        rate = line_plot([Series("rate", spin[0], np.degrees(spin[1]))], "time, s", "rate of turn, °/s", width=1140)  # fmt: skip
+        note = "of the sensor head; where it stalls, the scanner sees one plane only"
+        figures.append(_figure(rate, "Rate of turn", note, wide=True))
+    return f'<h2>Motion</h2><div class="grid">{"".join(figures)}</div>'
+
+
+def _windows(windows: Sequence[Mapping[str, Any]]) -> str:
+    if not windows:
+        return ""
+    t = _column(windows, "time")
+    own, fixed = _column(windows, "n_matches"), _column(windows, "n_fixed_matches")
+    matches = [Series("in the window", t, own), Series("to fixed views", t, fixed)]
+    share = [Series("share", t, 100 * _column(windows, "inlier_share"))]
+    residual = [Series("residual", t, _column(windows, "residual_rms"))]
+    surfels = [Series("surfels", t, _column(windows, "n_surfels"))]
+    figures = [
+        _figure(line_plot(matches, "time, s", "matches"), "Matches", "of surfaces, per window"),
+        _figure(line_plot(share, "time, s", "inliers, %", top=100), "Inliers", "matches that agree"),
+        _figure(line_plot(residual, "time, s", "residual, \N{GREEK SMALL LETTER SIGMA}"), "Residual", "in units of the expected noise; 1 is as expected"),
+        _figure(line_plot(surfels, "time, s", "surfels"), "Surfels", "pieces of surface seen per window"),
+    ]  # fmt: skip
+    return f'<h2>Estimate, window by window</h2><div class="grid">{"".join(figures)}</div>'
+
+
+def _record(record: Mapping[str, Any]) -> str:
+    settings, versions = record.get("settings") or {}, record.get("versions") or {}
+    blocks = [
+        ("Counts", sections.mapping_table(("what", "number"), record.get("counts") or {})),
+        ("Time", sections.timings_table(record.get("timings") or {})),
+        ("Settings", sections.mapping_table(("setting", "value"), settings)),
+        ("Versions", sections.mapping_table(("of", "version"), versions)),
+    ]
+    cells = "".join(f"<div><h3>{name}</h3>{html}</div>" for name, html in blocks)
+    inputs = sections.inputs_table(record.get("inputs") or [])
+    return f'<h2>Record</h2><div class="grid">{cells}<div class="wide"><h3>Inputs</h3>{inputs}</div></div>'
+
+
+def _figure(drawing: str, name: str, note: str = "", *, wide: bool = False) -> str:
+    kind = ' class="wide"' if wide else ""
+    caption = f"<b>{escape(name)}</b> {escape(note)}"
+    return f"<figure{kind}>{drawing}<figcaption>{caption}</figcaption></figure>"
+
+
+def _column(windows: Sequence[Mapping[str, Any]], name: str) -> NDArray[np.float64]:
+    values = [window.get(name) for window in windows]
+    return np.array([np.nan if value is None else float(value) for value in values])

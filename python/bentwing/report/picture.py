@@ -1,0 +1,202 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""Pictures of a point cloud without any drawing library: project, shade, encode as PNG."""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypeVar
+
+import numpy as np
+
+from bentwing.atomic import write_bytes
+from bentwing.report.colours import HEIGHT, colour
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+_Scalar = TypeVar("_Scalar", bound=np.generic)
+
+PAPER = 255  # brightness where there is no point
+_ENCLOSED = 3  # filled neighbours of eight
+_RADII = (1, 3)  # pixels over which depth is compared
+_OUTLIERS = 0.1  # percent of the points on each side that may fall off the picture
+_NEIGHBOURS = ((0, 1), (1, 0), (0, -1), (-1, 0), (1, 1), (1, -1), (-1, 1), (-1, -1))
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """An orthographic picture.
+
+    Attributes
+    ----------
+    image : (H, W, 3) uint8, first row on top
+    pixel : m, edge of a pixel
+    left, top : m, coordinates of the upper left corner along the picture's axes
+    low, high : values at the two ends of the colour map
+    """
+
+    image: NDArray[np.uint8]
+    pixel: float
+    left: float
+    top: float
+    low: float
+    high: float
+
+
+def render(
+    across: NDArray[np.float64],
+    up: NDArray[np.float64],
+    toward: NDArray[np.float64],
+    values: NDArray[np.float64],
+    *,
+    width: int = 1100,
+    max_height: int = 900,
+    table: tuple[str, ...] = HEIGHT,
+    shading: float = 1.0,
+    close_gaps: int = 3,
+) -> View:
+    """Draw points as seen from far away along one direction.
+
+    Parameters
+    ----------
+    across, up, toward : (N,) m, coordinates to the right, upwards and to the viewer
+    values : (N,) what the colour shows; its central 98 % span the colour map
+    width, max_height : pixels; the picture gets smaller pixels only as far as both allow
+    table : colour map
+    shading : 0 for flat colours, 1 for full eye-dome lighting
+    close_gaps : pixels by which gaps are filled from their edges; it thickens lines as well
+    """
+    left, right, bottom, top = _frame(across, up)
+    pixel = max((right - left) / width, (top - bottom) / max_height, 1e-3)
+    shape = (max(int((top - bottom) / pixel), 1) + 1, max(int((right - left) / pixel), 1) + 1)
+    low, high = np.percentile(values, [1, 99]) if len(values) else (0.0, 1.0)
+    front = _front_points(((top - up) / pixel, (across - left) / pixel), toward, shape)
+    depth = np.full(shape, -np.inf)
+    shade = np.full(shape, np.nan)
+    seen = front >= 0
+    depth[seen] = toward[front[seen]]
+    shade[seen] = (values[front[seen]] - low) / max(high - low, 1e-9)
+    for _ in range(close_gaps):
+        _close_gaps(depth, shade)
+    light = 1 - shading * (1 - _eye_dome(depth, pixel))
+    image = np.full((*shape, 3), PAPER, np.uint8)
+    seen = np.isfinite(depth)
+    image[seen] = colour(shade[seen], table) * light[seen][:, None]
+    return View(image, pixel, left, top, float(low), float(high))
+
+
+def render_top(
+    points: NDArray[np.float64],
+    values: NDArray[np.float64] | None = None,
+    *,
+    width: int = 1100,
+    max_height: int = 900,
+    table: tuple[str, ...] = HEIGHT,
+) -> NDArray[np.uint8]:
+    """Picture of a map from above, x to the right and y up.
+
+    Parameters
+    ----------
+    points : (N, 3) float64, m, map frame
+    values : (N,) what the colour shows; default: the height
+    width, max_height : pixels
+    table : colour map
+
+    Returns
+    -------
+    (H, W, 3) uint8
+    """
+    x, y, z = points.T
+    shown = z if values is None else values
+    return render(x, y, z, shown, width=width, max_height=max_height, table=table).image
+
+
+def encode_png(image: NDArray[np.uint8]) -> bytes:
+    """Encode an `(H, W, 3)` uint8 picture as PNG."""
+    height, width, _ = image.shape
+    # filter "up": differences to the row above compress far better than the colours themselves
+    above = np.vstack([np.zeros_like(image[:1]), image[:-1]])
+    rows = np.empty((height, 1 + 3 * width), np.uint8)
+    rows[:, 0] = 2
+    rows[:, 1:] = (image - above).reshape(height, -1)
+    header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
+    chunks = ((b"IHDR", header), (b"IDAT", zlib.compress(rows.tobytes(), 7)), (b"IEND", b""))
+    return b"\x89PNG\r\n\x1a\n" + b"".join(_png_chunk(kind, data) for kind, data in chunks)
+
+
+def write_png(path: Path, image: NDArray[np.uint8]) -> None:
+    """Write an `(H, W, 3)` uint8 picture as a PNG file, atomically."""
+    write_bytes(path, encode_png(image))
+
+
+def _png_chunk(kind: bytes, data: bytes) -> bytes:
+    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+
+def _frame(
+    across: NDArray[np.float64], up: NDArray[np.float64]
+) -> tuple[float, float, float, float]:
+    """Left, right, bottom and top that hold all but the outliers, with a margin of 2 %."""
+    if not len(across):
+        return -1.0, 1.0, -1.0, 1.0
+    left, right = np.percentile(across, [_OUTLIERS, 100 - _OUTLIERS])
+    bottom, top = np.percentile(up, [_OUTLIERS, 100 - _OUTLIERS])
+    margin = 0.02 * max(right - left, top - bottom, 1.0)
+    return left - margin, right + margin, bottom - margin, top + margin
+
+
+def _front_points(
+    place: tuple[NDArray[np.float64], NDArray[np.float64]],
+    toward: NDArray[np.float64],
+    shape: tuple[int, int],
+) -> NDArray[np.int64]:
+    """Index of the point nearest to the viewer in every pixel, -1 where there is none."""
+    row, column = (np.floor(coordinate).astype(np.int64) for coordinate in place)
+    inside = (row >= 0) & (row < shape[0]) & (column >= 0) & (column < shape[1])
+    order = np.argsort(toward, kind="stable")
+    order = order[inside[order]]
+    front = np.full(shape, -1, np.int64)
+    front[row[order], column[order]] = order  # of repeated places the last is kept: the nearest
+    return front
+
+
+def _close_gaps(depth: NDArray[np.float64], shade: NDArray[np.float64]) -> None:
+    """Give empty pixels enclosed by filled ones the nearest of their neighbours."""
+    around = np.pad(depth, 1, constant_values=-np.inf)
+    filled = np.isfinite(around).astype(np.uint8)
+    n_filled = sum(_moved(filled, step, 1) for step in _NEIGHBOURS)
+    row, column = np.nonzero(~np.isfinite(depth) & (n_filled >= _ENCLOSED))
+    steps = np.array(_NEIGHBOURS)
+    rows, columns = row + steps[:, :1], column + steps[:, 1:]  # (8, K)
+    nearest = np.argmax(around[rows + 1, columns + 1], axis=0)[None]
+    chosen = np.take_along_axis(rows, nearest, 0)[0], np.take_along_axis(columns, nearest, 0)[0]
+    depth[row, column], shade[row, column] = depth[chosen], shade[chosen]
+
+
+def _eye_dome(depth: NDArray[np.float64], pixel: float) -> NDArray[np.float64]:
+    """Brightness 0.3 to 1: dark where neighbouring pixels are nearer to the viewer.
+
+    References
+    ----------
+    Boucheny 2009, eye-dome lighting, here with two radii and no light direction.
+    """
+    floor = np.where(np.isfinite(depth), depth, np.inf)  # what is empty is behind nothing
+    around = np.pad(depth, max(_RADII), constant_values=-np.inf)
+    hidden = np.zeros_like(depth)
+    for radius in _RADII:
+        for step in _NEIGHBOURS:
+            nearer = _moved(around, (radius * step[0], radius * step[1]), max(_RADII)) - floor
+            nearer /= radius * pixel
+            hidden += np.clip(nearer, 0, 4.0, out=nearer)
+    return 0.3 + 0.7 * np.exp(-hidden / 16.0)
+
+
+def _moved(padded: NDArray[_Scalar], step: tuple[int, int], margin: int) -> NDArray[_Scalar]:
+    """View of a padded array from which every pixel sees its neighbour at `step`."""
+    rows, columns = (size - 2 * margin for size in padded.shape)
+    row, column = margin + step[0], margin + step[1]
+    return padded[row : row + rows, column : column + columns]

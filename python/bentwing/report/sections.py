@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""The verdict, the numbers and the tables of a report, as HTML."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from bentwing.trajectory import Trajectory
+
+Row = tuple[str, ...]
+
+DASH, TIMES = "\N{EN DASH}", "\N{MULTIPLICATION SIGN}"
+
+
+def verdict(record: Mapping[str, Any]) -> str:
+    """State in one box whether the result can be used as it is."""
+    warnings = [str(warning) for warning in record.get("warnings") or []]
+    if not record.get("complete", False):
+        stage, reason = record.get("stage", "?"), record.get("reason") or "not finished"
+        level, headline = "bad", "Incomplete: this is not a finished map"
+        sentence = (
+            f"The run stopped in the stage “{stage}”: {reason}. What was done until then is kept."
+        )
+    elif warnings:
+        plural = "s" if len(warnings) > 1 else ""
+        level, headline = "warn", f"Map finished, with {len(warnings)} warning{plural}"
+        sentence = f"Read {'these' if plural else 'this'} before using the map:"
+    else:
+        level, headline = "good", "Map finished, no warnings"
+        sentence = _quality(record.get("windows") or [])
+    items = "".join(f"<li>{escape(warning)}</li>" for warning in warnings)
+    listed = f"<ul>{items}</ul>" if items else ""
+    return (
+        f'<div class="verdict {level}"><strong>{escape(headline)}</strong>'
+        f"<p>{escape(sentence)}</p>{listed}</div>"
+    )
+
+
+def _quality(windows: Sequence[Mapping[str, Any]]) -> str:
+    shares = [w["inlier_share"] for w in windows if w.get("inlier_share") is not None]
+    if not shares:
+        return "All stages completed."
+    return (
+        f"All stages completed; {100 * float(np.median(shares)):.0f} % of the surface matches agree "
+        f"with the trajectory in the median window, {100 * min(shares):.0f} % in the worst."
+    )
+
+
+def tiles(record: Mapping[str, Any], trajectory: Trajectory, points: NDArray[np.float64]) -> str:
+    """Show the few numbers everybody asks for."""
+    counts, timings = record.get("counts") or {}, record.get("timings") or {}
+    facts: list[tuple[str, str]] = []
+    if len(trajectory.times) > 1:
+        duration = float(trajectory.times[-1] - trajectory.times[0])
+        facts.append((_clock(duration), "recording"))
+        facts.append((f"{path_length(trajectory):,.0f} m", "path flown or walked"))
+        if timings.get("total"):
+            facts.append((f"{duration / timings['total']:.1f} {TIMES}", "real time"))
+    if "map.points" in counts:
+        facts.append((_amount(counts["map.points"]), "points in the map"))
+    if len(points):
+        size = np.subtract(*np.percentile(points, [99.8, 0.2], axis=0))
+        facts.append((f" {TIMES} ".join(f"{s:.0f}" for s in size) + " m", "extent"))
+    if record.get("peak_memory_mb"):
+        facts.append((f"{record['peak_memory_mb'] / 1000:.1f} GB", "peak memory"))
+    cells = [
+        f'<div class="tile"><b>{escape(b)}</b><span>{escape(s)}</span></div>' for b, s in facts
+    ]
+    return f'<div class="tiles">{"".join(cells)}</div>'
+
+
+def path_length(trajectory: Trajectory) -> float:
+    """Length of the way, m, from positions ten times a second so that vibration does not count."""
+    times = np.arange(trajectory.times[0], trajectory.times[-1], 0.1)
+    positions, _ = trajectory.interpolate(times)
+    return float(np.linalg.norm(np.diff(positions, axis=0), axis=1).sum())
+
+
+def table(head: Row, rows: Iterable[Row], *, numbers: frozenset[int] = frozenset()) -> str:
+    """Make a table; the columns in `numbers` are set in tabular figures."""
+
+    def cell(i: int, text: str) -> str:
+        kind = ' class="n"' if i in numbers else ""
+        return f"<td{kind}>{escape(text)}</td>"
+
+    body = ["<tr>" + "".join(cell(i, t) for i, t in enumerate(row)) + "</tr>" for row in rows]
+    if not body:
+        return '<p class="none">Not recorded.</p>'
+    top = "".join(f"<th>{escape(text)}</th>" for text in head)
+    return f"<table><thead><tr>{top}</tr></thead><tbody>{''.join(body)}</tbody></table>"
+
+
+def mapping_table(head: Row, values: Mapping[str, Any]) -> str:
+    """Make a table of names and values, nested names joined by dots."""
+    return table(
+        head, [(k.replace("_", " "), _value(v)) for k, v in _flat(values)], numbers=frozenset({1})
+    )
+
+
+def timings_table(timings: Mapping[str, float]) -> str:
+    """Make the table of wall times by stage."""
+    rows = [
+        ((f"{DASH} " + name.split("/", 1)[1]) if "/" in name else name, f"{seconds:.2f}")
+        for name, seconds in timings.items()
+    ]
+    return table(("stage", "seconds"), rows, numbers=frozenset({1}))
+
+
+def inputs_table(inputs: Sequence[Mapping[str, Any]]) -> str:
+    """Make the table of input files with their hashes."""
+    rows = [
+        (str(i["name"]), f"{i['bytes'] / 1e6:,.1f} MB", f"{i['sha256']} ({i['hashed']})")
+        for i in inputs
+    ]
+    return table(("file", "size", "SHA-256 (of)"), rows, numbers=frozenset({1}))
+
+
+def _flat(values: Mapping[str, Any], prefix: str = "") -> list[tuple[str, Any]]:
+    flat: list[tuple[str, Any]] = []
+    for name, value in values.items():
+        if isinstance(value, dict):
+            flat += _flat(value, f"{prefix}{name}.")
+        else:
+            flat.append((f"{prefix}{name}", value))
+    return flat
+
+
+def _value(value: object) -> str:
+    if value is None:
+        return DASH
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, int):
+        return f"{value:,}"
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if isinstance(value, list):
+        return ", ".join(_value(item) for item in value)
+    return str(value)
+
+
+def _amount(n: int) -> str:
+    if n >= 10_000_000:
+        return f"{n / 1e6:.0f} M"
+    return f"{n / 1e6:.1f} M" if n >= 1_000_000 else f"{n:,}"
+
+
+def _clock(seconds: float) -> str:
+    whole = round(seconds)
+    return f"{whole // 60}:{whole % 60:02d} min" if whole >= 60 else f"{seconds:.0f} s"

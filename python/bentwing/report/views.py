@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""The views of a map a report shows: oblique, from above, from the side, and cut open."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bentwing.report.colours import HEIGHT, TIME
+from bentwing.report.picture import render
+from bentwing.report.svg import map_view
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from bentwing.trajectory import Trajectory
+
+SLAB = 1.0  # m, thickness of the section
+_HEADROOM = 0.3  # m above the sensor from which on a point counts as overhead
+_NEAR = 2.0  # m beside the sensor within which overhead points tell a roof
+_ROOFED_SHARE = 0.02  # of all points; in the open almost nothing is right above the sensor
+
+
+@dataclass(frozen=True, slots=True)
+class MapViews:
+    """SVG drawings of one map, and the sentence that says what was left out of the plan."""
+
+    oblique: str
+    plan_height: str
+    plan_time: str
+    side: str
+    section: str
+    plan_note: str
+
+
+def draw_views(
+    points: NDArray[np.float64], times: NDArray[np.float64], trajectory: Trajectory
+) -> MapViews:
+    """Draw all views of a map.
+
+    Parameters
+    ----------
+    points : (N, 3) float64, m, map frame
+    times : (N,) s since the recording's start
+    trajectory : of the IMU; drawn over the plan
+    """
+    overhead = overhead_points(points, times, trajectory)
+    along, beside = _directions(points)
+    path = trajectory.positions
+    plan, plan_times = points[~overhead], times[~overhead]
+    x, y, z = plan.T
+    by_height = render(x, y, z, z, width=800, max_height=800)
+    by_time = render(x, y, z, plan_times, width=800, max_height=800, table=TIME, shading=0.5)
+    centre = np.median(path, axis=0) if len(path) else np.zeros(3)
+    slab = np.abs((points - centre) @ beside) < SLAB / 2
+    note = "Points above the sensor are left out, so that the roof does not hide the floor."
+    return MapViews(
+        oblique=_oblique(plan, along, beside),
+        plan_height=map_view(
+            by_height, "height, m", HEIGHT, path=(path[:, 0], path[:, 1]), name="Plan"
+        ),
+        plan_time=map_view(by_time, "time, s", TIME, name="Plan by time"),
+        side=_upright(points, along, beside, "Side view"),
+        section=_upright(points[slab], along, beside, "Section"),
+        plan_note=note if overhead.any() else "",
+    )
+
+
+def overhead_points(
+    points: NDArray[np.float64], times: NDArray[np.float64], trajectory: Trajectory
+) -> NDArray[np.bool_]:
+    """Tell which points `(N,)` are above the sensor at their time, if there is a roof at all.
+
+    In the open nothing is marked: what is high there is what one wants to see from above.
+    """
+    if not len(points) or not len(trajectory.times):
+        return np.zeros(len(points), np.bool_)
+    inside = np.clip(times, trajectory.times[0], trajectory.times[-1])
+    from_sensor = points - trajectory.interpolate(inside)[0]
+    above: NDArray[np.bool_] = from_sensor[:, 2] > _HEADROOM
+    near = np.hypot(from_sensor[:, 0], from_sensor[:, 1]) < _NEAR
+    roofed = np.count_nonzero(above & near) > _ROOFED_SHARE * len(points)
+    return above if roofed else np.zeros(len(points), np.bool_)
+
+
+def _oblique(
+    points: NDArray[np.float64], along: NDArray[np.float64], beside: NDArray[np.float64]
+) -> str:
+    """Draw the map from 35° above the horizon, a quarter turned from its longer side."""
+    turn, lift = np.radians([28.0, 35.0])
+    across = np.cos(turn) * along + np.sin(turn) * beside
+    level = np.cos(turn) * beside - np.sin(turn) * along  # away from the viewer
+    up = np.sin(lift) * level + np.cos(lift) * np.array([0.0, 0.0, 1.0])
+    toward = -np.cos(lift) * level + np.sin(lift) * np.array([0.0, 0.0, 1.0])
+    view = render(points @ across, points @ up, points @ toward, points[:, 2], max_height=640)
+    return map_view(view, "height, m", HEIGHT, name="Oblique view", text_size=13)
+
+
+def _upright(
+    points: NDArray[np.float64],
+    along: NDArray[np.float64],
+    beside: NDArray[np.float64],
+    name: str,
+) -> str:
+    across, up, toward = points @ along, points[:, 2], -(points @ beside)
+    # gaps stay, because closing them would make walls look thicker than they are
+    view = render(across, up, toward, up, max_height=420, close_gaps=0)
+    return map_view(view, "height, m", HEIGHT, name=name, text_size=13)
+
+
+def _directions(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Horizontal unit vectors along the map's longer extent and to the left of it."""
+    if len(points) < 2:
+        return np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
+    _, vectors = np.linalg.eigh(np.cov(points[:: max(len(points) // 100_000, 1), :2].T))
+    x, y = vectors[:, 1] * (1.0 if vectors[0, 1] >= 0 else -1.0)
+    return np.array([x, y, 0.0]), np.array([-y, x, 0.0])

@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from bentwing import pipeline
+from bentwing.cli.main import run_command
+from bentwing.errors import BentwingError, EstimationError, RecordingError, UsageError
+
+BENTWING = "from bentwing.cli.main import run; run()"
+
+
+@pytest.fixture
+def called(monkeypatch):
+    """Stand in for the pipeline; the list receives the arguments of each call."""
+    calls = []
+
+    def record(*arguments, **options):
+        calls.append((arguments, options))
+
+    monkeypatch.setattr(pipeline, "map_recording", record)
+    return calls
+
+
+def failing(monkeypatch, error):
+    def fail(*_, **__):
+        raise error
+
+    monkeypatch.setattr(pipeline, "map_recording", fail)
+
+
+def test_help_names_the_commands(capsys):
+    assert run_command(["--help"]) == 0
+    out = capsys.readouterr().out
+    for command in ("map", "info", "simulate"):
+        assert command in out
+
+
+def test_help_loads_nothing_heavy():
+    script = (
+        "import sys; from bentwing.cli.main import run_command; run_command(['--help']); "
+        "print([m for m in ('numpy', 'laspy', 'rosbags', 'pydantic', 'matplotlib', "
+        "'bentwing.pipeline') if m in sys.modules])"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip().endswith("[]")
+
+
+def test_version_is_one_line(capsys):
+    assert run_command(["--version"]) == 0
+    assert capsys.readouterr().out.startswith("bentwing ")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["fly"], "No such command 'fly'"),
+        (["map"], "Missing"),
+        (["map", "a.bag"], "Missing option"),
+        (["map", "a.bag", "-o", "out", "--frobnicate"], "No such option"),
+        (["map", "a.bag", "-o", "out", "--threads", "none"], "--threads"),
+        (["map", "a.bag", "-o", "out", "--threads", "0"], "--threads"),
+        (["map", "a.bag", "-o", "out", "--start", "-1"], "--start"),
+        (["map", "a.bag", "-o", "out", "--estimator", "kalman"], "not in this version"),
+        (["map", "a.bag", "-o", "out", "--estimator", "magic"], "'magic' is not known"),
+        (["map", "a.bag", "-o", "out", "--map-format", "obj"], "'obj' is not known"),
+    ],
+)
+def test_wrong_usage_is_one_sentence_and_exit_code_2(capsys, arguments, message):
+    assert run_command(arguments) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.startswith("bentwing: error: ")
+    assert message in err
+    assert err.count("\n") == 1
+
+
+def test_options_reach_the_pipeline(called, capsys):
+    arguments = [
+        "map", "a.mcap", "b.mcap", "--payload", "head.yaml", "-o", "out", "--map-format", "ply",
+        "--map-spacing", "0.02", "--no-loop-closure", "--threads", "2", "--start", "5",
+        "--duration", "60", "--quiet",
+    ]  # fmt: skip
+    assert run_command(arguments) == 0
+    ((paths, payload, out), options) = called[0]
+    assert paths == [Path("a.mcap"), Path("b.mcap")]
+    assert (payload, out) == (Path("head.yaml"), Path("out"))
+    options.pop("progress")
+    assert options == {
+        "estimator": "continuous", "map_format": "ply", "map_spacing": 0.02, "loop_closure": False,
+        "threads": 2, "start": 5.0, "duration": 60.0,
+    }  # fmt: skip
+    assert capsys.readouterr() == ("", "")
+
+
+def test_a_finished_map_says_where_the_report_is(called, capsys):
+    assert run_command(["map", "a.mcap", "-o", "out"]) == 0
+    assert len(called) == 1
+    assert "out/report.html" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("error", "code"),
+    [
+        (BentwingError("m"), 1),
+        (UsageError("m"), 2),
+        (RecordingError("m"), 3),
+        (EstimationError("m"), 4),
+        (KeyboardInterrupt(), 130),
+    ],
+)
+def test_every_expected_error_has_its_exit_code_and_no_traceback(monkeypatch, capsys, error, code):
+    failing(monkeypatch, error)
+    assert run_command(["map", "a.mcap", "-o", "out"]) == code
+    expected = "interrupted" if isinstance(error, KeyboardInterrupt) else "m"
+    assert capsys.readouterr().err == f"bentwing: error: {expected}\n"
+
+
+def test_a_full_disk_is_told_as_such(monkeypatch, capsys):
+    failing(monkeypatch, OSError(28, "No space left on device", "out/map.laz"))
+    assert run_command(["map", "a.mcap", "-o", "out"]) == 1
+    assert capsys.readouterr().err == "bentwing: error: out/map.laz: No space left on device\n"
+
+
+@pytest.mark.parametrize("debug", [False, True])
+def test_an_unexpected_error_asks_to_be_reported(monkeypatch, capsys, debug):
+    monkeypatch.delenv("BENTWING_DEBUG", raising=False)
+    monkeypatch.setattr(os, "environ", dict(os.environ))
+    failing(monkeypatch, ZeroDivisionError("division by zero"))
+    option = ["--debug"] if debug else []
+    assert run_command([*option, "map", "a.mcap", "-o", "out"]) == 70
+    err = capsys.readouterr().err
+    assert "please report it" in err
+    assert ("Traceback" in err) is debug
+
+
+def test_an_interrupt_ends_a_running_command_within_a_second(tmp_path):
+    script = f"""
+import time
+from bentwing import pipeline
+def busy(*_, **__):
+    print("busy", flush=True)
+    time.sleep(60)
+pipeline.map_recording = busy
+import sys
+sys.argv = ["bentwing", "map", "a", "-o", {str(tmp_path)!r}]
+{BENTWING}
+"""
+    process = subprocess.Popen(
+        [sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    assert process.stdout.readline() == "busy\n"
+    process.send_signal(signal.SIGINT)
+    started = time.monotonic()
+    _, err = process.communicate(timeout=20)
+    assert process.returncode == 130
+    assert err == "bentwing: error: interrupted\n"
+    assert time.monotonic() - started < 1.0

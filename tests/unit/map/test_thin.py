@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+import tracemalloc
+
+import numpy as np
+import pytest
+
+from bentwing.errors import UsageError
+from bentwing.map.chunk import MapChunk
+from bentwing.map.sample import MapSample
+from bentwing.map.thin import VoxelSet, thin
+
+
+def chunks(points, n_chunks=10):
+    times = np.arange(len(points), dtype=np.float64)
+    for part in np.array_split(np.arange(len(points)), n_chunks):
+        yield MapChunk(points[part], times[part], np.zeros(len(part), np.float32))
+
+
+def test_the_first_point_of_every_voxel_is_kept():
+    points = np.random.default_rng(0).uniform(-1, 1, (5000, 3))
+    counts = {}
+    kept = np.concatenate([c.times for c in thin(chunks(points), 0.1, counts)]).astype(int)
+    _, first = np.unique(np.floor(points / 0.1), axis=0, return_index=True)
+    assert kept.tolist() == sorted(first.tolist())
+    assert counts["map.thinned"] == 5000 - len(kept)
+
+
+def test_spacing_zero_keeps_all_points():
+    points = np.zeros((100, 3))
+    assert sum(map(len, thin(chunks(points), 0.0))) == 100
+
+
+@pytest.mark.parametrize("spacing", [-0.1, np.nan, np.inf])
+def test_an_impossible_spacing_is_refused_before_the_work(spacing):
+    with pytest.raises(UsageError, match="map spacing"):
+        thin([], spacing)
+
+
+def test_the_set_agrees_with_a_set_of_python():
+    rng, reference, ours = np.random.default_rng(1), set(), VoxelSet()
+    for _ in range(200):
+        keys = rng.integers(0, 5000, rng.integers(0, 200))
+        expected = []
+        for key in keys.tolist():
+            expected.append(key not in reference)
+            reference.add(key)
+        assert ours.add(keys).tolist() == expected
+    assert len(ours) == len(reference)
+
+
+def test_a_million_voxels_cost_a_few_bytes_each():
+    ours, n = VoxelSet(), 1_000_000
+    tracemalloc.start()
+    for start in range(0, n, 100_000):
+        ours.add(np.arange(start, start + 100_000) * 7919)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    # 50 million voxels at this rate stay below 2 GB
+    assert peak < 40 * n
+
+
+def test_the_sample_is_even_and_bounded():
+    points = np.random.default_rng(0).uniform(-1, 1, (12_345, 3))
+    sample = MapSample(limit=1000)
+    passed = sum(len(chunk) for chunk in sample.watch(chunks(points, 37)))
+    assert passed == 12_345
+    assert 500 <= len(sample.points) <= 1000
+    assert len(np.unique(np.diff(sample.times))) == 1
+    assert np.array_equal(sample.points, points[sample.times.astype(int)])

@@ -1,0 +1,177 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+import base64
+import re
+import sys
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+from bentwing import geometry
+from bentwing.report import write_report
+from bentwing.trajectory import Trajectory
+
+RECORD = {
+    "complete": True,
+    "stage": "done",
+    "reason": None,
+    "started": "2026-03-04T09:12:44+00:00",
+    "versions": {"bentwing": "0.1.0", "numpy": "2.0"},
+    "inputs": [{"name": "yard.mcap", "bytes": 10**6, "sha256": "ab" * 32, "hashed": "all"}],
+    "settings": {"estimator": "continuous", "payload": {"self_hits": [], "name": "head"}},
+    "counts": {"map.points": 12_345_678, "preprocess.range": 3},
+    "timings": {"estimate": 4.0, "estimate/solve": 1.0, "total": 5.0},
+    "warnings": [],
+    "peak_memory_mb": 512.0,
+    "calibration": {
+        "latency": 0.00213,
+        "T_imu_lidar_translation": [0.0312, 0.0, -0.05],
+        "T_imu_lidar_quat_xyzw": [0.0, 0.0, 0.0, 1.0],
+        "gyro_bias": [0.001, 0.0, 0.0],
+        "accel_bias": [0.02, 0.0, 0.0],
+        "gravity": [0.0, 0.0, 9.81],
+        "encoder_zero": 0.01,
+        "std": {"latency": [2e-5], "extrinsic_translation": [4e-4] * 3, "encoder_zero": [1e-4]},
+    },
+    "windows": [
+        {"time": float(t), "n_matches": 100 + t, "n_fixed_matches": 50, "inlier_share": 0.9,
+         "residual_rms": None if t == 3 else 1.0, "n_surfels": 500}
+        for t in range(10)
+    ],
+}  # fmt: skip
+
+
+def trajectory():
+    times = 0.01 * np.arange(1000)
+    turns = np.stack([0 * times, 0 * times, np.mod(4 * times, 6) - 3], axis=1)
+    return Trajectory(
+        times, np.stack([times, np.sin(times), 1 + 0 * times], axis=1), geometry.exp(turns)
+    )
+
+
+def sample(n=5000):
+    rng = np.random.default_rng(0)
+    points = rng.uniform([-5, -5, 0], [15, 5, 0.1], (n, 3))
+    return points, rng.uniform(0, 9.9, n)
+
+
+NO_POINTS = (np.empty((0, 3)), np.empty(0))
+
+
+class Page(HTMLParser):
+    void = ("meta", "br", "img")
+
+    def __init__(self):
+        super().__init__()
+        self.open, self.links, self.counts = [], [], {}
+
+    def handle_starttag(self, tag, attrs):
+        self.counts[tag] = self.counts.get(tag, 0) + 1
+        self.links += [v for k, v in attrs if k in {"src", "href"}]
+        if tag not in self.void:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attrs):
+        self.handle_starttag(tag, attrs)
+        self.open.pop()
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+
+def written(path, **changes):
+    values = {"run_json": RECORD, "trajectory": trajectory(), "map_sample": sample()}
+    values["spin"] = (trajectory().times, np.full(1000, 4.4))
+    write_report(path / "report.html", **{**values, **changes})
+    text = (path / "report.html").read_text()
+    page = Page()
+    page.feed(text)
+    assert page.open == []
+    return text, page
+
+
+@pytest.fixture(scope="module")
+def whole_page(tmp_path_factory):
+    return written(tmp_path_factory.mktemp("report"))
+
+
+def test_the_page_has_all_parts_and_needs_no_network(whole_page):
+    text, page = whole_page
+    for heading in ("Map", "Motion", "Estimate, window by window", "Calibration", "Record"):
+        assert f"<h2>{heading}" in text
+    for part in ("Oblique view", "Plan by time", "Side view", "Section", "Rate of turn",
+                 "Position", "Matches", "Inliers", "Residual", "Surfels", "yard.mcap"):  # fmt: skip
+        assert part in text
+    assert page.counts["svg"] == 5 + 3 + 4
+    assert all(link.startswith("data:image/png;base64,") for link in page.links)
+    assert not re.search(r"https?://(?!www\.w3\.org/2000/svg)", text)
+    assert "<script" not in text
+
+
+def test_the_pictures_are_png(whole_page):
+    _, page = whole_page
+    for link in page.links:
+        assert base64.b64decode(link.split(",")[1]).startswith(b"\x89PNG\r\n\x1a\n")
+
+
+def test_numbers_appear_with_their_deviations(whole_page):
+    text, _ = whole_page
+    for number in (
+        "2.130",
+        "± 0.020",
+        "31.2",
+        "± 0.4",
+        "12 M",
+        "0.573",
+        "0.5 GB",
+        "2.0 \N{MULTIPLICATION SIGN}",
+    ):
+        assert number in text, number
+
+
+def test_no_drawing_library_is_loaded(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    written(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("changes", "headline", "level"),
+    [
+        ({}, "Map finished, no warnings", "good"),
+        ({"warnings": ["Head stalled."]}, "with 1 warning<", "warn"),
+        ({"warnings": ["a", "b"]}, "with 2 warnings", "warn"),
+        ({"complete": False, "stage": "map", "reason": "interrupted"}, "Incomplete", "bad"),
+    ],
+)
+def test_the_verdict_says_first_whether_the_map_can_be_used(tmp_path, changes, headline, level):
+    text, _ = written(tmp_path, run_json={**RECORD, **changes}, map_sample=NO_POINTS)
+    verdict = text[text.index('<div class="verdict') :][:400]
+    assert headline in verdict
+    assert f'class="verdict {level}"' in verdict
+
+
+def test_a_run_that_failed_early_still_has_a_page(tmp_path):
+    nothing = Trajectory(np.empty(0), np.empty((0, 3)), np.empty((0, 4)))
+    record = {"complete": False, "stage": "start", "reason": "no lidar"}
+    text, _ = written(
+        tmp_path, run_json=record, trajectory=nothing, map_sample=NO_POINTS, spin=None
+    )
+    assert "no lidar" in text
+    assert "No points were mapped" in text
+
+
+@pytest.mark.parametrize("n", [1, 2])
+def test_very_few_points_and_poses_are_drawn(tmp_path, n):
+    few = Trajectory(
+        trajectory().times[:n], trajectory().positions[:n], trajectory().quats_xyzw[:n]
+    )
+    written(tmp_path, trajectory=few, map_sample=(sample()[0][:n], np.zeros(n)))
+
+
+def test_names_from_outside_cannot_become_markup(tmp_path):
+    evil = "<script>alert(1)</script>"
+    record = {**RECORD, "warnings": [evil], "settings": {evil: evil}, "reason": evil}
+    record["inputs"] = [{"name": evil, "bytes": 1, "sha256": evil, "hashed": evil}]
+    text, page = written(tmp_path, run_json=record, map_sample=NO_POINTS)
+    assert "script" not in page.counts
+    assert evil not in text

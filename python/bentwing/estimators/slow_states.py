@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""The slow states of the continuous estimator: their places, priors and carried information."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bentwing.errors import UsageError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from numpy.typing import NDArray
+
+    from bentwing.recording.payload import Imu
+
+N_STATES = 20
+# Order of the core's `registration::index`.
+SLICES = {
+    "latency": slice(0, 1),
+    "extrinsic_rotation": slice(1, 4),
+    "extrinsic_translation": slice(4, 7),
+    "gyro_bias": slice(7, 10),
+    "accel_bias": slice(10, 13),
+    "gravity": slice(13, 15),
+    "encoder_zero": slice(15, 16),
+    "motor_tilt": slice(16, 18),
+    "motor_offset": slice(18, 20),
+}
+MOTOR_STATES = ("encoder_zero", "motor_tilt", "motor_offset")
+
+# Standard deviations before anything was measured: s, rad, m, rad/s, m/s², rad, rad, rad, m.
+INITIAL_STD = {
+    "latency": 3e-3,
+    "extrinsic_rotation": 9e-3,
+    "extrinsic_translation": 5e-3,
+    "gyro_bias": 2.5e-4,
+    "accel_bias": 0.04,
+    "gravity": 0.02,
+    "encoder_zero": 9e-3,
+    "motor_tilt": 9e-3,
+    "motor_offset": 3e-3,
+}
+MOVING_START_STD = {"gyro_bias": 0.02, "accel_bias": 0.1, "gravity": 0.2}
+# Random walks, per √s.
+WALK = {"latency": 1e-5, "extrinsic_rotation": 1e-6, "extrinsic_translation": 1e-6, "accel_bias": 3e-4}
+
+# Each second is seen in several windows, and the matches of a surface are not independent.
+MATCH_INDEPENDENCE = 0.1
+
+
+class SlowStatePrior:
+    """What is known of the slow states, carried from window to window.
+
+    Re-centring a prior of fixed width on the last estimate would let weakly observable directions
+    walk; carrying the information each window gains holds them.
+    """
+
+    def __init__(self, imu: Imu | None, *, has_motor: bool, moving: bool, frozen: Iterable[str]) -> None:
+        names = _frozen_names(frozen, has_imu=imu is not None, has_motor=has_motor)
+        std = INITIAL_STD | (MOVING_START_STD if moving else {})
+        self.frozen = np.zeros(N_STATES, dtype=bool)
+        self._information = np.zeros((N_STATES, N_STATES))
+        self._walk = np.zeros(N_STATES)
+        walk = WALK if imu is None else WALK | {"gyro_bias": imu.gyro_bias_walk}
+        for name, place in SLICES.items():
+            index = np.arange(N_STATES)[place]
+            self.frozen[place] = name in names
+            self._information[index, index] = std[name] ** -2
+            self._walk[place] = walk.get(name, 0.0) ** 2
+
+    @property
+    def information(self) -> NDArray[np.float64]:
+        """(20, 20) information about the current values."""
+        return self._information
+
+    def tighten(self, name: str, std: NDArray[np.float64]) -> None:
+        """Replace the prior of one state by independent standard deviations."""
+        index = np.arange(N_STATES)[SLICES[name]]
+        self._information[index, :] = 0.0
+        self._information[:, index] = 0.0
+        self._information[index, index] = std**-2.0
+
+    def carry(self, covariance: NDArray[np.float64], shift: float, window: float) -> None:
+        """Forget by the random walks over `shift` seconds, and add what a window has gained.
+
+        Parameters
+        ----------
+        covariance : (20, 20) of the slow states after the window, prior included
+        shift, window : s
+        """
+        active = ~self.frozen
+        if not active.any():
+            return
+        block = np.ix_(active, active)
+        before = self._information[block]
+        gained = np.linalg.inv(covariance[block]) - before
+        diffused = np.linalg.inv(before) + np.diag(self._walk[active] * shift)
+        share = MATCH_INDEPENDENCE * shift / window
+        after = np.linalg.inv(diffused) + share * _positive_part(gained)
+        self._information[block] = 0.5 * (after + after.T)
+
+
+def named_std(covariance: NDArray[np.float64], frozen: NDArray[np.bool_]) -> dict[str, list[float]]:
+    """Return the standard deviations of the states that are estimated, by name."""
+    std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    return {name: std[s].tolist() for name, s in SLICES.items() if not frozen[s].all()}
+
+
+def _frozen_names(frozen: Iterable[str], *, has_imu: bool, has_motor: bool) -> set[str]:
+    names = set(frozen)
+    unknown = names - SLICES.keys()
+    if unknown:
+        msg = f"frozen: unknown states {sorted(unknown)}; choose from {list(SLICES)}"
+        raise UsageError(msg)
+    if not has_imu:
+        names |= SLICES.keys() - set(MOTOR_STATES)
+    if not has_motor:
+        names |= set(MOTOR_STATES)
+    return names
+
+
+def _positive_part(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Drop directions of negative information, which only rounding makes."""
+    values, vectors = np.linalg.eigh(0.5 * (matrix + matrix.T))
+    return np.asarray((vectors * np.maximum(values, 0.0)) @ vectors.T)

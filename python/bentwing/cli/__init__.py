@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""cli"""
+"""The commands: each parses its arguments, makes one call and ends with an exit code."""

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""evaluate"""
+"""A run and the truth in, numbers out."""

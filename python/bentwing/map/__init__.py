@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""map"""
+"""Trajectory and batches in, the point cloud of the map out."""

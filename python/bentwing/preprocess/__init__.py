@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""preprocess"""
+"""Batches in, usable batches and the state at the start out."""

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""report"""
+"""The numbers of a run in, one self-contained page out."""

@@ -129,7 +129,7 @@ bench: $(CORE) ## kernels (criterion), then accuracy and speed from recording to
 
 .PHONY: docs
 docs: $(VENV)/.docs-tools ## build the documentation into site/
-	DISABLE_MKDOCS_2_WARNING=true $(BIN)/mkdocs build --strict
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
 # Not with the developer's environment: what a user does, from the clone to the map.
 DEMO_PIP := env -u VIRTUAL_ENV -u PYO3_PYTHON demo/.venv/bin/python -m pip --disable-pip-version-check

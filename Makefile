@@ -124,7 +124,7 @@ deny: ## licences, advisories and sources of the crates (needs cargo-deny)
 
 .PHONY: bench
 bench: $(CORE) ## kernels (criterion), then accuracy and speed from recording to map
-	$(if $(wildcard benches/*.rs),cargo bench --workspace --bench '*')
+	$(if $(filter-out benches/lib.rs,$(wildcard benches/*.rs)),cargo bench --workspace --bench '*')
 	$(BIN)/python benches/pipeline.py $(if $(SCENARIOS),$(SCENARIOS))
 
 .PHONY: docs

@@ -84,7 +84,7 @@ def measure(scenario: str, duration: float, folder: Path) -> str:
     open_loop = absolute_error(out / "odometry.txt", truth)
     return (
         f"| {scenario} | {100 * closed:.2f} cm | {100 * open_loop:.2f} cm "
-        f"| {duration / cost.seconds:.2f} × real time | {cost.megabytes:.0f} MB |"
+        f"| {duration / cost.seconds:.2f} times real time | {cost.megabytes:.0f} MB |"
     )
 
 

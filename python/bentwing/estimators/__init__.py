@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""estimators"""
+"""Batches in, trajectory and calibration out; nothing downstream knows which estimator ran."""

@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+# Everything a developer or the continuous integration types. `make help` lists the targets.
+
+PYTHON ?= python3
+WORKERS ?= 2
+
+VENV := .venv
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip --disable-pip-version-check
+CORE := python/bentwing/_core.abi3.so
+CORE_SOURCES := Cargo.toml Cargo.lock pyproject.toml \
+	$(shell find crates -name '*.rs' -o -name Cargo.toml -o -name README.md)
+
+# The tools look for an active environment; whatever the caller has active is not ours.
+export VIRTUAL_ENV := $(CURDIR)/$(VENV)
+export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
+unexport CONDA_PREFIX PYTHONHOME PYTHONPATH
+
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.NOTPARALLEL:
+
+##@ Set up and build
+
+define require_python
+@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10))' || \
+	{ echo "$(PYTHON) is missing or too old: give Python 3.10 or newer as make PYTHON=..."; exit 1; }
+endef
+
+$(VENV)/.created:
+	$(require_python)
+	$(PYTHON) -m venv --clear $(VENV)
+	@# Installing dependency groups needs pip 25.1; Debian 12 ships 23.
+	$(PIP) install --quiet --upgrade 'pip>=25.1'
+	@touch $@
+
+# A changed pyproject.toml may name new tools; where it does not, this takes seconds.
+$(VENV)/.tools: $(VENV)/.created pyproject.toml
+	$(PIP) install --quiet --group dev
+	@touch $@
+
+$(VENV)/.docs-tools: $(VENV)/.created pyproject.toml
+	$(PIP) install --quiet --group docs
+	@touch $@
+
+$(CORE): $(VENV)/.tools $(CORE_SOURCES)
+	$(BIN)/maturin develop --release --extras plot
+	@touch $@
+
+.PHONY: setup
+setup: $(VENV)/.tools ## make .venv and install the developer's tools
+
+.PHONY: build
+build: setup ## compile the core (release) and install the package in place
+	$(BIN)/maturin develop --release --extras plot
+	@touch $(CORE)
+
+.PHONY: build-dev
+build-dev: setup ## the same without optimization: compiles fast, runs slowly
+	$(BIN)/maturin develop --extras plot
+	@touch $(CORE)
+
+.PHONY: wheel
+wheel: setup ## build the wheel into dist/
+	$(BIN)/maturin build --release --out dist
+
+##@ Test
+
+.PHONY: test
+test: test-rust test-python ## all fast tests
+
+.PHONY: test-rust
+test-rust: setup ## the crates' tests
+	cargo test --workspace
+
+.PHONY: test-python
+test-python: $(CORE) ## the package's fast tests
+	$(BIN)/python -m pytest -n $(WORKERS)
+
+.PHONY: test-all
+test-all: test-rust $(CORE) ## also the slow ones
+	$(BIN)/python -m pytest -n $(WORKERS) -m "slow or not slow"
+
+.PHONY: golden
+golden: $(CORE) ## regenerate tests/golden; review the difference before you commit it
+	BENTWING_UPDATE_GOLDEN=1 $(BIN)/python -m pytest tests/golden
+	git --no-pager diff --stat -- tests/golden
+
+##@ Look after the code
+
+.PHONY: fmt
+fmt: setup ## format Rust and Python
+	cargo fmt --all
+	$(BIN)/ruff format
+	$(BIN)/ruff check --fix
+
+.PHONY: check
+check: check-rust check-python ## formatting, lints, types, stubs, documentation, spelling
+	$(BIN)/typos
+
+.PHONY: check-rust
+check-rust: setup ## rustfmt, clippy and rustdoc; warnings are errors
+	cargo fmt --all --check
+	cargo clippy --workspace --all-targets -- -D warnings
+	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps
+
+.PHONY: check-python
+check-python: $(CORE) $(if $(wildcard python/bentwing/_core.pyi),stubs) ## ruff, mypy, stubs
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy
+
+.PHONY: stubs
+stubs: $(CORE) ## compare the hand-written stubs with the compiled core
+	$(BIN)/python -m mypy.stubtest bentwing._core
+
+.PHONY: deny
+deny: ## licences, advisories and sources of the crates (needs cargo-deny)
+	@cargo deny --version >/dev/null 2>&1 || \
+		{ echo "cargo-deny is missing: cargo install --locked cargo-deny"; exit 1; }
+	cargo deny check
+
+##@ Look at the results
+
+.PHONY: bench
+bench: $(CORE) ## kernels (criterion), then accuracy and speed from recording to map
+	$(if $(filter-out benches/lib.rs,$(wildcard benches/*.rs)),cargo bench --workspace --bench '*')
+	$(BIN)/python benches/pipeline.py $(if $(SCENARIOS),$(SCENARIOS))
+
+.PHONY: docs
+docs: $(VENV)/.docs-tools ## build the documentation into site/
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
+
+# Not with the developer's environment: what a user does, from the clone to the map.
+DEMO_PIP := env -u VIRTUAL_ENV -u PYO3_PYTHON demo/.venv/bin/python -m pip --disable-pip-version-check
+
+.PHONY: demo
+demo: ## from a fresh clone to a map: needs Python 3.10 with venv, cargo, git and make
+	$(require_python)
+	rm -rf demo/dist demo/recording demo/run
+	$(PYTHON) -m venv demo/.venv
+	$(DEMO_PIP) wheel --no-deps --wheel-dir demo/dist .
+	$(DEMO_PIP) install --force-reinstall --no-deps demo/dist/bentwing-*.whl
+	$(DEMO_PIP) install "$$(echo demo/dist/bentwing-*.whl)[plot]"
+	demo/.venv/bin/bentwing simulate courtyard -o demo/recording --duration 30
+	demo/.venv/bin/bentwing map demo/recording/recording.bag \
+		--payload demo/recording/payload.yaml -o demo/run
+	@printf '\n  %-8s %s\n' map "$$(ls -d demo/run/map.l* demo/run/map.p[lc]* 2>/dev/null | head -1)" \
+		picture "$$(ls demo/run/*.png 2>/dev/null | head -1)" report demo/run/report.html
+
+##@ This file
+
+.PHONY: clean
+clean: ## remove everything that was built
+	rm -rf .venv target dist site demo $(CORE) .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	find python tests benches -name __pycache__ -prune -exec rm -rf {} +
+
+.PHONY: help
+help: ## this list
+	@awk 'BEGIN { FS = ":.*## " } \
+		/^##@/ { printf "\n%s\n", substr($$0, 5) } \
+		/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)

@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""What every source file of the project has in common."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+SPDX = "SPDX-License-Identifier: MIT OR Apache-2.0"
+MAX_LINES = 500
+SUFFIXES = {".py", ".pyi", ".rs"}
+
+
+def sources(*folders: str) -> list[Path]:
+    found = [
+        path
+        for folder in folders
+        for path in sorted((ROOT / folder).rglob("*"))
+        if path.suffix in SUFFIXES and "target" not in path.relative_to(ROOT).parts
+    ]
+    assert found, f"no source files below {folders}"
+    return found
+
+
+def own_lines(path: Path) -> int:
+    """Lines of a file without its own unit tests."""
+    text = path.read_text(encoding="utf-8")
+    if path.suffix == ".rs":
+        text = re.split(r"^#\[cfg\(test\)\]\s*\nmod \w+ \{", text, maxsplit=1, flags=re.MULTILINE)[
+            0
+        ]
+    return len(text.splitlines())
+
+
+def is_test(path: Path) -> bool:
+    return path.name == "tests.rs" or "tests" in path.relative_to(ROOT).parts
+
+
+def test_no_source_file_exceeds_500_lines() -> None:
+    long = {
+        str(path.relative_to(ROOT)): own_lines(path)
+        for path in sources("python", "crates")
+        if not is_test(path) and own_lines(path) > MAX_LINES
+    }
+    assert not long, f"look for the seam: {long}"
+
+
+def test_every_source_file_starts_with_its_licence() -> None:
+    without = [
+        str(path.relative_to(ROOT))
+        for path in sources("python", "crates", "tests", "benches", "docs", "examples")
+        if SPDX not in path.read_text(encoding="utf-8").partition("\n")[0]
+    ]
+    assert not without, f"the first line must hold '{SPDX}': {without}"

@@ -4,11 +4,13 @@ import signal
 import subprocess
 import sys
 import time
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
 
 from bentwing import pipeline
+from bentwing.cli.commands import COMMANDS
 from bentwing.cli.main import run_command
 from bentwing.errors import BentwingError, EstimationError, RecordingError, UsageError
 
@@ -51,6 +53,19 @@ def test_help_loads_nothing_heavy():
         [sys.executable, "-c", script], capture_output=True, text=True, check=True
     )
     assert done.stdout.strip().endswith("[]")
+
+
+def test_every_command_has_its_module_and_a_first_line_of_help():
+    for module, _, line in COMMANDS.values():
+        assert find_spec(f"bentwing.cli.{module}") is not None
+        assert line.endswith(".")
+
+
+def test_help_of_a_command_names_its_options(capsys):
+    assert run_command(["map", "--help"]) == 0
+    out = capsys.readouterr().out
+    assert "--payload" in out
+    assert "bentwing map" in out
 
 
 def test_version_is_one_line(capsys):

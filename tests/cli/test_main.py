@@ -77,8 +77,8 @@ def test_version_is_one_line(capsys):
     ("arguments", "message"),
     [
         (["fly"], "No such command 'fly'"),
-        (["map"], "Missing"),
-        (["map", "a.bag"], "Missing option"),
+        (["map"], "bentwing map RECORDING -o OUT"),
+        (["map", "a.bag"], "bentwing map RECORDING -o OUT"),
         (["map", "a.bag", "-o", "out", "--frobnicate"], "No such option"),
         (["map", "a.bag", "-o", "out", "--threads", "none"], "--threads"),
         (["map", "a.bag", "-o", "out", "--threads", "0"], "--threads"),
@@ -113,6 +113,13 @@ def test_options_reach_the_pipeline(called, capsys):
         "threads": 2, "start": 5.0, "duration": 60.0,
     }  # fmt: skip
     assert capsys.readouterr() == ("", "")
+
+
+def test_settings_are_shown_without_a_recording(called, capsys, monkeypatch):
+    monkeypatch.setattr(pipeline, "settings_text", lambda *asked: f"{asked}")
+    assert run_command(["map", "--print-settings", "--payload", "head.yaml"]) == 0
+    assert "('continuous', PosixPath('head.yaml'))" in capsys.readouterr().out
+    assert called == []
 
 
 def test_a_finished_map_says_where_the_report_is(called, capsys):

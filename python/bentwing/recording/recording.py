@@ -197,6 +197,13 @@ class Recording:
     def warnings(self) -> list[str]:
         """What was found odd so far, as sentences; complete after a pass over `batches`."""
         sentences = [*self._source.warnings, *self._opening_warnings]
+        reading = self._peeks["lidar"].reading
+        if reading is not None and reading.origin == "sensor":
+            sentences.append(
+                f"{self.lidar_topic}: the points' times are on another clock than the header "
+                "stamps, so each sweep's first point is put at its stamp; let the driver use one "
+                "clock, or expect the stamps' jitter"
+            )
         gnss = self.payload.gnss
         if gnss is not None and gnss.topic not in {topic.name for topic in self.topics}:
             sentences.append(

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from bentwing.simulate.rig import Rig
 
-SceneName = Literal["courtyard", "office"]
+SceneName = Literal["courtyard", "office", "forest", "cave", "mine", "town"]
 HeadName = Literal["hokuyo-spin", "hokuyo-nod", "vlp16-fixed", "vlp16-motor"]
 Format = Literal["bag", "mcap", "db3"]
 

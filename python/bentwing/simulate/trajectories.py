@@ -108,7 +108,8 @@ def quadrotor_flight(
 def _phases(rng: np.random.Generator, duration: float, height: float) -> Phases:
     rotors = rng.uniform(3.5, 5.0)
     climb = rotors + rng.uniform(2.5, 3.5)
-    rise = max(2.5, height / 1.2)
+    # Slow near the ground, up to 2 m/s on a long way up.
+    rise = max(2.5, height / 1.2) if height < 6.0 else 5.0 + (height - 6.0) / 2.0
     touch = duration - 3.5
     phases = Phases(rotors, climb, climb + rise, touch - 1.2 * rise, touch, touch + 2.0)
     if phases.descent - phases.cruise < 2.0:

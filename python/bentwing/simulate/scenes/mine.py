@@ -53,7 +53,7 @@ def _surfaces(xs: list[float], ys: list[float], is_open: NDArray[np.bool_], h: f
 
 
 def _wall(x: tuple[float, float], y: tuple[float, float], h: float, side: tuple[int, int]) -> Mesh:
-    """The wall on one side of a cell, seen from the cell."""
+    """Build the wall on one side of a cell, seen from the cell."""
     dx, dy = x[1] - x[0], y[1] - y[0]
     match side:
         case (1, 0):
@@ -66,10 +66,8 @@ def _wall(x: tuple[float, float], y: tuple[float, float], h: float, side: tuple[
             return _rectangle((x[0], y[0], 0), (0, 0, h), (dx, 0, 0))
 
 
-def _rectangle(
-    corner: tuple[float, ...], a: tuple[float, ...], b: tuple[float, ...]
-) -> Mesh:
-    """A subdivided rectangle facing a × b."""
+def _rectangle(corner: tuple[float, ...], a: tuple[float, ...], b: tuple[float, ...]) -> Mesh:
+    """Build a subdivided rectangle facing a × b."""
     u, v = np.array(a, dtype=np.float64), np.array(b, dtype=np.float64)
     n_u, n_v = (int(np.ceil(np.linalg.norm(w) / STEP)) + 1 for w in (u, v))
     s, t = np.meshgrid(np.linspace(0, 1, n_u), np.linspace(0, 1, n_v), indexing="ij")

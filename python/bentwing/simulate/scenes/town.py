@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from bentwing.simulate.scenes.mesh import Mesh, box, gable, ground, merge, smooth_noise
@@ -31,7 +29,7 @@ def town(rng: np.random.Generator) -> Site:
 
 
 def _plot(rng: np.random.Generator) -> list[Mesh]:
-    """A house, mostly with an annex, a tree and a car, on a plot with its corner at the origin."""
+    """Build a house, mostly with an annex, a tree and a car, on a plot with its corner at the origin."""
     size = rng.uniform((9.0, 7.5, 3.0), (14.0, 10.0, 7.5))
     turn = rng.choice([0.0, np.pi / 2]) + rng.normal(0.0, 0.04)
     middle = (11.0 + rng.uniform(-1, 1), 10.0 + rng.uniform(-1, 1), 0.0)

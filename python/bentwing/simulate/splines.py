@@ -33,8 +33,8 @@ _BASIS = _basis()
 class Spline:
     """A smooth function of time that follows its control points.
 
-    It stays inside the hull of six neighbouring control points and is exactly constant where
-    those are equal, so a carrier that does not move does not move at all.
+    It stays inside the hull of six neighbouring control points and is constant where those
+    are equal, so a carrier at rest does not move at all.
 
     Attributes
     ----------

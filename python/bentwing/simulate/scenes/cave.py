@@ -51,4 +51,4 @@ def _sweep(rng: np.random.Generator, along: Array, around: Array, radii: Array) 
     points[..., 1:] *= 1.0 + np.reshape(roughness, (*s.shape, 1))
     points[..., 1] += bend(along[:, None])[:, None]
     points[:, -1] = points[:, 0]
-    return sheet(points).flipped()
+    return sheet(points)

@@ -36,10 +36,6 @@ class Mesh:
         turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
         return Mesh(self.vertices @ turn.T + np.asarray(at), self.triangles)
 
-    def flipped(self) -> Mesh:
-        """Seen from the other side."""
-        return Mesh(self.vertices, np.ascontiguousarray(self.triangles[:, ::-1]))
-
 
 def merge(meshes: Iterable[Mesh]) -> Mesh:
     """All meshes as one."""

@@ -1,5 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! `_core.Scene`: rays and distances to a triangle mesh.
+#![expect(
+    clippy::needless_pass_by_value,
+    reason = "PyO3 extracts arguments by value"
+)]
 
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
@@ -91,7 +95,7 @@ fn rows<'a, T: numpy::Element>(
     if !array.is_c_contiguous() {
         return Err(not_contiguous());
     }
-    let flat = array.as_slice().map_err(|_| not_contiguous())?;
+    let flat = array.as_slice().map_err(|_strided| not_contiguous())?;
     Ok(flat.as_chunks().0)
 }
 

@@ -4,11 +4,13 @@ import signal
 import subprocess
 import sys
 import time
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
 
 from bentwing import pipeline
+from bentwing.cli.commands import COMMANDS
 from bentwing.cli.main import run_command
 from bentwing.errors import BentwingError, EstimationError, RecordingError, UsageError
 
@@ -53,6 +55,19 @@ def test_help_loads_nothing_heavy():
     assert done.stdout.strip().endswith("[]")
 
 
+def test_every_command_has_its_module_and_a_first_line_of_help():
+    for module, _, line in COMMANDS.values():
+        assert find_spec(f"bentwing.cli.{module}") is not None
+        assert line.endswith(".")
+
+
+def test_help_of_a_command_names_its_options(capsys):
+    assert run_command(["map", "--help"]) == 0
+    out = capsys.readouterr().out
+    assert "--payload" in out
+    assert "bentwing map" in out
+
+
 def test_version_is_one_line(capsys):
     assert run_command(["--version"]) == 0
     assert capsys.readouterr().out.startswith("bentwing ")
@@ -62,8 +77,8 @@ def test_version_is_one_line(capsys):
     ("arguments", "message"),
     [
         (["fly"], "No such command 'fly'"),
-        (["map"], "Missing"),
-        (["map", "a.bag"], "Missing option"),
+        (["map"], "bentwing map RECORDING -o OUT"),
+        (["map", "a.bag"], "bentwing map RECORDING -o OUT"),
         (["map", "a.bag", "-o", "out", "--frobnicate"], "No such option"),
         (["map", "a.bag", "-o", "out", "--threads", "none"], "--threads"),
         (["map", "a.bag", "-o", "out", "--threads", "0"], "--threads"),
@@ -98,6 +113,13 @@ def test_options_reach_the_pipeline(called, capsys):
         "threads": 2, "start": 5.0, "duration": 60.0,
     }  # fmt: skip
     assert capsys.readouterr() == ("", "")
+
+
+def test_settings_are_shown_without_a_recording(called, capsys, monkeypatch):
+    monkeypatch.setattr(pipeline, "settings_text", lambda *asked: f"{asked}")
+    assert run_command(["map", "--print-settings", "--payload", "head.yaml"]) == 0
+    assert "('continuous', PosixPath('head.yaml'))" in capsys.readouterr().out
+    assert called == []
 
 
 def test_a_finished_map_says_where_the_report_is(called, capsys):

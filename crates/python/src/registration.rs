@@ -15,7 +15,7 @@ use crate::errors::{in_pool, solve_error};
 use crate::trajectory::{Globals, Imu, Samples};
 
 #[derive(FromPyObject)]
-struct SurfelSettings {
+pub(crate) struct SurfelSettings {
     voxel_size: f64,
     n_levels: usize,
     max_gap: f64,
@@ -27,7 +27,7 @@ struct SurfelSettings {
 }
 
 #[derive(FromPyObject)]
-struct RegistrationSettings {
+pub(crate) struct RegistrationSettings {
     knot_interval: f64,
     range_sigma: f64,
     n_neighbors: usize,

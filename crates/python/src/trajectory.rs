@@ -92,6 +92,24 @@ impl Samples {
         .map_err(|e| PyValueError::new_err(e.to_string()))
     }
 
+    /// Position (3,), m, at `time`.
+    fn position_at<'py>(&self, py: Python<'py>, time: f64) -> Bound<'py, PyArray1<f64>> {
+        vector(py, &self.0.pose(time).p)
+    }
+
+    /// These samples with those from `first` on replaced by `newer`.
+    fn replaced(&self, first: usize, newer: &Self) -> PyResult<Self> {
+        if first > self.0.len() {
+            let message = format!("first: expected at most {}, got {first}", self.0.len());
+            return Err(PyValueError::new_err(message));
+        }
+        let positions = [&self.0.positions()[..first], newer.0.positions()].concat();
+        let rotations = [&self.0.rotations()[..first], newer.0.rotations()].concat();
+        Trajectory::new(self.0.start(), self.0.dt(), positions, rotations)
+            .map(Self)
+            .map_err(|e| PyValueError::new_err(e.to_string()))
+    }
+
     /// These samples extended to `until` by the IMU, or at constant velocity without one; and the
     /// number of samples for which the IMU had a gap.
     fn extended(&self, imu: Option<&Imu>, globals: &Globals, until: f64) -> (Self, usize) {
@@ -230,6 +248,13 @@ impl Globals {
             accel_bias: accel_bias.into(),
             gravity: gravity.into(),
         }))
+    }
+
+    /// The same states with gravity straight up.
+    fn levelled(&self) -> Self {
+        let mut globals = self.0.clone();
+        globals.gravity = Vector3::z() * globals.gravity.norm();
+        Self(globals)
     }
 
     /// Lidar stamps minus IMU clock, s.

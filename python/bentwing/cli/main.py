@@ -10,9 +10,7 @@ from typing import Annotated
 
 import typer
 
-from bentwing.cli.info import info
-from bentwing.cli.map import map_command
-from bentwing.cli.simulate import simulate_command
+from bentwing.cli.commands import LazyCommands
 from bentwing.errors import BentwingError
 
 INTERRUPTED = 130
@@ -27,15 +25,12 @@ _CommandLineError: type[Exception] = next(
 
 app = typer.Typer(
     name="bentwing",
+    cls=LazyCommands,
     help="Accurate trajectories and 3D maps from lidars that move on their carrier, without GNSS.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-# The modules of the commands import what they need when they run, so that --help is fast.
-app.command("map")(map_command)
-app.command("info")(info)
-app.command("simulate")(simulate_command)
 
 
 def _print_version(wanted: bool) -> None:  # noqa: FBT001 - typer calls it so
@@ -70,7 +65,7 @@ def run() -> None:
 def run_command(arguments: list[str]) -> int:
     """Run one command; return its exit code, having said in one sentence what went wrong."""
     try:
-        result = app(arguments, standalone_mode=False)
+        result = app(arguments, prog_name="bentwing", standalone_mode=False)
     except BentwingError as error:
         return _fail(str(error), error.exit_code)
     except _CommandLineError as error:

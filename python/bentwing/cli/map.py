@@ -10,9 +10,11 @@ import typer
 
 
 def map_command(
-    recording: Annotated[list[Path], typer.Argument(help="Recording, or its consecutive parts.")],
+    recording: Annotated[
+        list[Path] | None, typer.Argument(help="Recording, or its consecutive parts.")
+    ] = None,
     *,
-    out: Annotated[Path, typer.Option("-o", "--out", help="Folder to write into.")],
+    out: Annotated[Path | None, typer.Option("-o", "--out", help="Folder to write into.")] = None,
     payload: Annotated[
         Path | None, typer.Option(help="payload.yaml, the description of the sensor head.")
     ] = None,
@@ -37,12 +39,16 @@ def map_command(
     ] = False,
 ) -> None:
     """Turn a recording into a trajectory, a map and a report."""
-    from bentwing import pipeline
+    from bentwing import pipeline  # slow to import, so only when it is needed
+    from bentwing.errors import UsageError
     from bentwing.progress import create_progress
 
     if print_settings:
         typer.echo(pipeline.settings_text(estimator, payload))
         return
+    if not recording or out is None:
+        msg = "a recording and a folder for the results are needed: bentwing map RECORDING -o OUT"
+        raise UsageError(msg)
     pipeline.map_recording(
         recording,
         payload,

@@ -3,8 +3,8 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Annotated
+from pathlib import Path  # noqa: TC003 - typer reads the annotations
+from typing import Annotated, get_args
 
 import typer
 from pydantic import ValidationError
@@ -13,27 +13,46 @@ from rich.progress import Progress
 
 from bentwing.errors import UsageError
 from bentwing.simulate import Scenario, simulate
+from bentwing.simulate.events import EventName
+from bentwing.simulate.scenario import HeadName, SceneName
 
 Option = typer.Option
 
 
-def simulate_command(
-    scenario: Annotated[str, typer.Argument(help="courtyard or office", show_default=False)],
+def _names(choices: object) -> str:
+    return ", ".join(get_args(choices))
+
+
+def simulate_command(  # noqa: PLR0917 - one parameter per option
+    scenario: Annotated[str, typer.Argument(help=f"One of {_names(SceneName)}.")],
     out: Annotated[Path, Option("--output", "-o", help="Folder to write into.")],
-    head: Annotated[str, Option(help="hokuyo-spin")] = "hokuyo-spin",
+    head: Annotated[
+        str | None,
+        Option(help=f"One of {_names(HeadName)}.", show_default="hokuyo-spin; town: vlp16-motor"),
+    ] = None,
     duration: Annotated[float, Option(help="Length of the recording, s.")] = 60.0,
-    seed: Annotated[int, Option(help="Varies geometry, motion and noise.")] = 0,
-    format: Annotated[str, Option(help="bag (ROS 1), mcap or db3 (ROS 2).")] = "bag",  # noqa: A002
-    max_range: Annotated[float | None, Option(help="Lidar sees up to here, m.")] = None,
+    seed: Annotated[int, Option(help="Varies geometry, motion, calibration and noise.")] = 0,
+    bag_format: Annotated[
+        str, Option("--format", help="bag (ROS 1), or mcap or db3 (ROS 2).")
+    ] = "bag",
+    motor_rate: Annotated[float, Option(help="Rate of vlp16-motor, rad/s.")] = 1.0,
+    max_range: Annotated[
+        float | None, Option(help="The lidar sees up to here, m.", show_default="the sensor's")
+    ] = None,
+    event: Annotated[
+        list[str] | None, Option(help=f"Repeatable: {_names(EventName)}.", show_default=False)
+    ] = None,
 ) -> None:
     """Simulate a recording with truth: bag, payload.yaml, trajectory, scene and calibration."""
-    choices = {
+    choices: dict[str, object] = {
         "scene": scenario,
         "head": head,
         "duration": duration,
         "seed": seed,
-        "format": format,
+        "format": bag_format,
+        "motor_rate": motor_rate,
         "max_range": max_range,
+        "events": event or (),
     }
     _run(_scenario(choices), out)
 

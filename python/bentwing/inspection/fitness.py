@@ -90,6 +90,8 @@ def judge(recording: Recording, samples: Samples, *, has_payload: bool) -> Judge
         start = find_static_start(judged[0], *imu_units.in_si(*judged))
         static = None if start is None else (start.start, start.end)
         warnings += _imu_rate(recording, samples) + _start_warnings(static)
+        if (mirrored := imu_units.mirrored_axis(judged[0], *imu_units.in_si(*judged))) is not None:
+            warnings.append(f"{recording.imu_topic}: {mirrored}")
     defects += _planar_defects(recording, samples)
     defects += _mount_defects(recording, has_payload=has_payload)
     return Judgement(defects, warnings, static, gyro)

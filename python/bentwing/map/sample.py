@@ -23,7 +23,7 @@ class MapSample:
     limit : the sample holds at most this many points, and at least half as many if there were
     """
 
-    def __init__(self, limit: int = 2_000_000) -> None:
+    def __init__(self, limit: int = 1_200_000) -> None:
         self._limit = limit
         self._step = 1
         self._next = 0  # how many points still pass before the next is kept

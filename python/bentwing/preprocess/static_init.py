@@ -1,10 +1,5 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""Find the stretch at the start in which the payload stood still, and what it tells.
-
-References
-----------
-Kaul 2015, section 2.6: the payload rests for some seconds before it moves.
-"""
+"""Find the stretch at the start in which the payload stood still, and what it tells."""
 
 from __future__ import annotations
 

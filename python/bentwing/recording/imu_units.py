@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""Tell from its samples whether an IMU reports m/s² and rad/s on right-handed axes.
+"""Tell from its samples whether an IMU reports m/s² and rad/s, on the same axes.
 
 The accelerometer's unit shows in the length of its median. The gyro's is harder: a payload may
 well turn at 6 or even 20 rad/s. Two things are certain: no common gyro measures beyond 35 rad/s
 (2000 °/s), and while the head tilts, the direction of gravity turns in the IMU's frame as the
-integrated gyro says, in one unit and with one set of signs only.
+integrated gyro says, in one unit only.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing.errors import RecordingError
 from bentwing.recording.batches import ImuBatch
 
 if TYPE_CHECKING:
@@ -27,7 +26,8 @@ if TYPE_CHECKING:
 CHECKED = 20.0  # s of the recording's beginning
 MIN_SAMPLES = 20
 MAX_RATE = 35.0  # rad/s, full scale of the fastest common gyros
-ACCEL_RANGE = (4.0, 40.0)  # m/s², median length; wide for vibration and centrifugal force
+# m/s², median length; 0.3 m off the axis of a spin of 15 rad/s it is seven times gravity.
+ACCEL_RANGE = (4.0, 250.0)
 # Unit, the range of the median length that says so, and the factor that makes m/s² of it.
 ACCEL_UNITS = (
     ("g", (0.5, 2.0), 9.80665),
@@ -39,20 +39,6 @@ WINDOW = 0.3  # s over which the turn of gravity and of the gyro are compared
 # A reading is believed where it explains half of gravity's turning and four times better than
 # the samples as they are.
 EXPLAINS, BETTER = 0.5, 0.25
-
-
-def check(topic: str, batches: Iterable[Batch]) -> None:
-    """Refuse an IMU in wrong units or with mirrored axes, from the beginning of its samples.
-
-    Raises
-    ------
-    RecordingError
-        All that is wrong, with how to repair it.
-    """
-    found = problems(*collect(batches))
-    if found:
-        msg = f"{topic}: {'; '.join(found)}"
-        raise RecordingError(msg)
 
 
 def collect(
@@ -143,6 +129,24 @@ def _gyro_problem(
     windows = _GravityWindows(times, gyro, accel)
     if windows.explained_by(DEGREE):
         return f"the angular rates are in deg/s (gravity turns as slowly in the accelerations); {repair}"
+    return None
+
+
+def mirrored_axis(
+    times: NDArray[np.float64], gyro: NDArray[np.float64], accel: NDArray[np.float64]
+) -> str | None:
+    """Return a sentence where gravity turns as if an axis of the gyro were mirrored.
+
+    No ground to refuse a recording: an IMU swung fast below its pivot feels its own acceleration
+    more than gravity, and that turns the other way.
+
+    Parameters
+    ----------
+    times : (M,) s; gyro : (M, 3) rad/s; accel : (M, 3), any unit
+    """
+    if len(times) < MIN_SAMPLES:
+        return None
+    windows = _GravityWindows(times, gyro, accel)
     mirrored = [
         axes
         for axes in itertools.product((1.0, -1.0), repeat=3)
@@ -153,8 +157,8 @@ def _gyro_problem(
     best = min(mirrored, key=lambda axes: windows.residual(1.0, axes))
     names = " and ".join(name for name, sign in zip("xyz", best, strict=True) if sign < 0)
     return (
-        f"gyro and accelerometer disagree about the direction of axis {names}; flip the sign of "
-        f"{names} in one of them, so that the axes are right-handed"
+        f"gyro and accelerometer seem to disagree about the direction of axis {names}; if the head "
+        f"was not swung like a pendulum, flip the sign of {names} in one of them"
     )
 
 

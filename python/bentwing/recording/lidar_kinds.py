@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""What is known about a lidar from its kind alone: ranges and range noise from the data sheets."""
+"""What is assumed of a lidar from its kind alone: usable ranges and range noise."""
 
 from __future__ import annotations
 
@@ -18,8 +18,7 @@ class KindDefaults:
     range_sigma: float
 
 
-# max_range stays below the data sheet's figure where the far returns are known to be sparse or
-# biased; range_sigma is one standard deviation on a matt wall.
+# Cautious round figures of the order the makers give; a payload file overrides each of them.
 KIND_DEFAULTS: dict[LidarKind, KindDefaults] = {
     "hokuyo-utm30lx": KindDefaults(0.3, 30.0, 0.015),
     "vlp16": KindDefaults(0.5, 100.0, 0.02),

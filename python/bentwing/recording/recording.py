@@ -61,6 +61,7 @@ class Recording:
         self.strict = strict
         self._source = open_source(self.paths)
         self._streams: dict[str, Stream] = {}
+        self._opening_warnings: list[str] = []
         try:
             self._survey()
         except BaseException:
@@ -86,7 +87,15 @@ class Recording:
         for problem in self.clock_problems():
             raise RecordingError(problem)
         if "imu" in self._peeks:
-            imu_units.check(self.imu_topic or "", self._first_imu_batches())
+            self._check_imu()
+
+    def _check_imu(self) -> None:
+        samples = imu_units.collect(self._first_imu_batches())
+        if found := imu_units.problems(*samples):
+            msg = f"{self.imu_topic}: {'; '.join(found)}"
+            raise RecordingError(msg)
+        if (mirrored := imu_units.mirrored_axis(*samples)) is not None:
+            self._opening_warnings.append(f"{self.imu_topic}: {mirrored}")
 
     def clock_problems(self) -> list[str]:
         """Return a sentence for each sensor that does not share the lidar's clock."""
@@ -187,7 +196,14 @@ class Recording:
     @property
     def warnings(self) -> list[str]:
         """What was found odd so far, as sentences; complete after a pass over `batches`."""
-        sentences = list(self._source.warnings)
+        sentences = [*self._source.warnings, *self._opening_warnings]
+        reading = self._peeks["lidar"].reading
+        if reading is not None and reading.origin == "sensor":
+            sentences.append(
+                f"{self.lidar_topic}: the points' times are on another clock than the header "
+                "stamps, so each sweep's first point is put at its stamp; let the driver use one "
+                "clock, or expect the stamps' jitter"
+            )
         gnss = self.payload.gnss
         if gnss is not None and gnss.topic not in {topic.name for topic in self.topics}:
             sentences.append(

@@ -3,11 +3,12 @@
 
 The lidar's types are in `wire_scans` and `wire_clouds`.
 
-A scan of 400 beams takes a generic deserializer many times as long as these views on the bytes,
-and a recording has tens of thousands of them. It also makes message definitions unnecessary: these
-types have not changed since ROS 1. Every function takes `(raw, cdr)`, `cdr` telling ROS 2's
-encoding (CDR, aligned) from ROS 1's (packed), and raises `BrokenMessageError` for bytes that are no such
-message.
+These types have not changed since ROS 1, so recordings without message definitions, or with
+damaged ones, can be read too; and an Imu message, of which there are most, takes a sixth of the
+time of a generic deserializer (a scan about the same).
+
+Every function takes `(raw, cdr)`, `cdr` telling ROS 2's encoding (CDR, aligned) from ROS 1's
+(packed), and raises `BrokenMessageError` for bytes that are no such message.
 """
 
 from __future__ import annotations

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 SLAB = 1.0  # m, thickness of the section
 _HEADROOM = 0.3  # m above the sensor from which on a point counts as overhead
 _NEAR = 2.0  # m beside the sensor within which overhead points tell a roof
-_ROOFED_SHARE = 0.02  # of all points; in the open almost nothing is right above the sensor
+_ROOFED_SHARE = 0.5  # of the seconds; in the open almost nothing is ever right above the sensor
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +81,9 @@ def overhead_points(
     from_sensor = points - trajectory.interpolate(inside)[0]
     above: NDArray[np.bool_] = from_sensor[:, 2] > _HEADROOM
     near = np.hypot(from_sensor[:, 0], from_sensor[:, 1]) < _NEAR
-    roofed = np.count_nonzero(above & near) > _ROOFED_SHARE * len(points)
+    seconds = np.floor(times)
+    n_roofed = len(np.unique(seconds[above & near]))
+    roofed = n_roofed > _ROOFED_SHARE * len(np.unique(seconds))
     return above if roofed else np.zeros(len(points), np.bool_)
 
 

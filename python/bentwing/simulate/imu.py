@@ -55,7 +55,9 @@ class ImuErrors:
         left = np.cos(np.pi * self.rotor_hz / RATE_HZ) ** 2 / np.sqrt(2) + 0.02
         white = (self.gyro_noise, self.accel_noise)
         tones = (self.gyro_vibration, self.accel_vibration)
-        both = [np.hypot(w, left * a / np.sqrt(NODE_RATE_HZ)) for w, a in zip(white, tones)]
+        both = [
+            np.hypot(w, left * a / np.sqrt(NODE_RATE_HZ)) for w, a in zip(white, tones, strict=True)
+        ]
         return float(both[0]), float(both[1])
 
 
@@ -77,7 +79,7 @@ class Imu:
     activity: Callable[[Array], Array]
     biases: Array = field(init=False)
     _phase: float = field(init=False)
-    _directions: Array = field(init=False)
+    _directions: tuple[Array, Array] = field(init=False)
 
     def __post_init__(self) -> None:
         sizes = np.repeat([self.errors.gyro_bias, self.errors.accel_bias], 3)
@@ -96,14 +98,14 @@ class Imu:
         steps = np.repeat([e.gyro_bias_walk, e.accel_bias_walk], 3) / np.sqrt(RATE_HZ)
         walk = self.biases + np.cumsum(self.rng.normal(size=(n, 6)) * steps, axis=0)
         self.biases = walk[-1]
-        return walk
+        return np.asarray(walk)
 
     def _noise(self, n: int) -> Array:
         sigma = np.repeat([self.errors.gyro_noise, self.errors.accel_noise], 3) * np.sqrt(RATE_HZ)
-        return self.rng.normal(size=(n, 6)) * sigma
+        return np.asarray(self.rng.normal(size=(n, 6)) * sigma)
 
     def _vibrate(self, times: Array) -> Array:
-        """The rotor tone, its frequency wandering, and two harmonics past the sensor's filter."""
+        """Return the rotor tone, its frequency wandering, and two harmonics past the sensor's filter."""
         e = self.errors
         gains, offsets = self._directions
         frequency = e.rotor_hz * (1.0 + 0.01 * np.sin(0.7 * times) + 0.004 * np.sin(2.9 * times))
@@ -119,5 +121,5 @@ class Imu:
 
 
 def specific_force(motion: Motion) -> Array:
-    """What an accelerometer at the frame's origin feels (M, 3): +g upwards at rest."""
+    """Return what an accelerometer at the frame's origin feels (M, 3): +g upwards at rest."""
     return apply(motion.R.transpose(0, 2, 1), motion.a + GRAVITY)

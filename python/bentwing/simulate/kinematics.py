@@ -40,7 +40,7 @@ class Motion:
     alpha: Array
 
     def turned(self, axis: Array, angle: Spline, times: Array) -> Motion:
-        """The frame turned by `angle(times)` about the unit vector `axis` of this frame."""
+        """Return the frame turned by `angle(times)` about the unit vector `axis` of this frame."""
         theta, rate, rate_dot = (angle(times, k)[:, 0] for k in range(3))
         R_b_c = rotation(axis * theta[:, None])
         omega = _into(R_b_c, self.omega)
@@ -50,7 +50,7 @@ class Motion:
         return Motion(self.R @ R_b_c, self.p, self.v, self.a, omega + spin, alpha)
 
     def mounted(self, R_b_c: Array, t_b_c: Array) -> Motion:
-        """The motion of a frame c fixed in b by the constant `T_b_c`."""
+        """Return the motion of a frame c fixed in b by the constant `T_b_c`."""
         v_c = np.cross(self.omega, t_b_c)
         a_c = np.cross(self.alpha, t_b_c) + np.cross(self.omega, v_c)
         return Motion(
@@ -127,7 +127,7 @@ def rotation(phi: Array) -> Array:
 
 
 def quats_xyzw(R: Array) -> Array:
-    """Unit Hamilton quaternions (N, 4) of rotation matrices (N, 3, 3), with w ≥ 0."""
+    """Return unit Hamilton quaternions (N, 4) of rotation matrices (N, 3, 3), with w ≥ 0."""
     # The largest of the four squared components is found from the diagonal and divides the rest.
     d = R[:, [0, 1, 2], [0, 1, 2]]
     trace = d.sum(axis=1)

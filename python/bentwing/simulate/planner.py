@@ -58,11 +58,12 @@ def plan_tour(
     reachable = np.flatnonzero(np.isfinite(distances))
     route, at, flown = [home], home, 0.0
     while flown < length - distances[at] or len(route) == 1:
-        goal = _next_goal(rng, reachable, nodes, at, length - flown, distances)
         costs, previous = _shortest_paths(nodes, edges, at)
+        others = reachable[reachable != at]
+        goal = _next_goal(rng, others, costs[others], (costs + distances)[others], length - flown)
         route += _path(previous, at, goal)
         flown, at = flown + costs[goal], goal
-    route += _path(before, home, at)[-2::-1] + [home]
+    route += [*_path(before, home, at)[-2::-1], home]
     return Tour(pad, nodes[route])
 
 
@@ -78,7 +79,9 @@ def _free_points(
         candidates = _above_ground(world, candidates, rng.uniform(*heights, len(candidates)))
     free = candidates[world.clearance(candidates) > clearance]
     if len(free) < 2:
-        msg = f"no place in this scene is {clearance:.1f} m away from every surface: try another seed"
+        msg = (
+            f"no place in this scene is {clearance:.1f} m away from every surface: try another seed"
+        )
         raise UsageError(msg)
     return free[:N_NODES]
 
@@ -110,7 +113,7 @@ def _connect(world: World, nodes: Array, clearance: float) -> list[list[int]]:
 def _choose_pad(
     world: World, rng: np.random.Generator, nodes: Array, edges: list[list[int]]
 ) -> tuple[int, Array]:
-    """A node of the largest connected part that stands over level, open ground."""
+    """Return a node of the largest connected part that stands over level, open ground."""
     best: tuple[int, int, Array] | None = None
     for node in rng.permutation(len(nodes)):
         pad = _pad_below(world, nodes[node])
@@ -128,7 +131,7 @@ def _choose_pad(
 
 
 def _pad_below(world: World, node: Array) -> Array | None:
-    """The ground under `node`, or None if it is too high, uneven or hemmed in."""
+    """Return the ground under `node`, or None if it is too high, uneven or hemmed in."""
     around = PAD_RADIUS * np.array([(0, 0, 0), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0)])
     down = np.tile([0.0, 0.0, -1.0], (5, 1))
     heights = node[2] - world.scene.cast(node + around, down, 200.0)[0]
@@ -144,18 +147,16 @@ def _pad_below(world: World, node: Array) -> Array | None:
 
 def _next_goal(
     rng: np.random.Generator,
-    reachable: NDArray[np.int64],
-    nodes: Array,
-    at: int,
+    nodes: NDArray[np.int64],
+    costs: Array,
+    costs_there_and_home: Array,
     remaining: float,
-    home_distances: Array,
 ) -> int:
-    """The farthest of a few random nodes from which the way home is not too long."""
-    goals = rng.choice(reachable[reachable != at], size=6)
-    costs = np.linalg.norm(nodes[goals] - nodes[at], axis=1) + home_distances[goals]
-    affordable = costs <= max(remaining, float(costs.min()))
-    away = np.linalg.norm(nodes[goals] - nodes[at], axis=1)
-    return int(goals[np.argmax(np.where(affordable, away, -1.0))])
+    """Return the farthest of a few random nodes from which the way home is not too long."""
+    drawn = rng.integers(len(nodes), size=6)
+    round_trips = costs_there_and_home[drawn]
+    affordable = round_trips <= max(remaining, float(round_trips.min()))
+    return int(nodes[drawn[np.argmax(np.where(affordable, costs[drawn], -1.0))]])
 
 
 def _shortest_paths(nodes: Array, edges: list[list[int]], start: int) -> tuple[Array, list[int]]:

@@ -158,5 +158,5 @@ def incidence(normals: Array, faces: NDArray[np.int32], directions: Array) -> Ar
 def nodes_around(beams: Beams, motion: Callable[[Array], Motion]) -> Nodes:
     """Exact poses every millisecond, over the time of the beams."""
     start = float(beams.times.min())
-    times = start + NODE_STEP * np.arange(int((beams.times.max() - start) / NODE_STEP) + 2)
+    times = start + NODE_STEP * np.arange(int((beams.times.max() - start) / NODE_STEP) + 2.0)
     return Nodes(start, NODE_STEP, motion(times))

@@ -11,11 +11,20 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+POINT_FIELDS = [
+    ("x", 0, 7),
+    ("y", 4, 7),
+    ("z", 8, 7),
+    ("intensity", 12, 7),
+    ("ring", 16, 4),
+    ("time", 18, 7),
+]
+"""Name, offset and `sensor_msgs/PointField` datatype (7: float32, 4: uint16)."""
 POINT = np.dtype(
     {
-        "names": ["x", "y", "z", "intensity", "ring", "time"],
-        "formats": ["<f4", "<f4", "<f4", "<f4", "<u2", "<f4"],
-        "offsets": [0, 4, 8, 12, 16, 18],
+        "names": [name for name, _, _ in POINT_FIELDS],
+        "formats": ["<u2" if datatype == 4 else "<f4" for _, _, datatype in POINT_FIELDS],
+        "offsets": [offset for _, offset, _ in POINT_FIELDS],
         "itemsize": 22,
     }
 )

@@ -13,6 +13,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from bentwing.simulate.records import (
     POINT,
+    POINT_FIELDS,
     CloudRecord,
     EncoderRecord,
     ImuRecord,
@@ -29,7 +30,9 @@ if TYPE_CHECKING:
 EPOCH_NS = 1_704_067_200_000_000_000
 """The recordings begin on 1 January 2024, 00:00 UTC."""
 
-_DATATYPES = {"<f4": 7, "<u2": 4}
+
+Message = Any
+"""A message or its class, made by `rosbags` at run time from ROS's own definitions."""
 
 
 def to_ns(time: float) -> int:
@@ -66,7 +69,7 @@ class BagWriter:
         self._writer.close()
 
     def write(self, topic: str, frame: str, record: Record) -> None:
-        """Appends one record, at its time of arrival."""
+        """Append one record, at its time of arrival."""
         message = self._message(record, self._header(topic, frame, record.stamp))
         kind: str = message.__msgtype__
         if topic not in self._connections:
@@ -76,10 +79,10 @@ class BagWriter:
         data = encode(message, kind)
         self._writer.write(self._connections[topic], to_ns(record.arrival), data)
 
-    def _type(self, name: str) -> Any:
+    def _type(self, name: str) -> Message:
         return self._types.types[name]
 
-    def _header(self, topic: str, frame: str, stamp: float) -> Any:
+    def _header(self, topic: str, frame: str, stamp: float) -> Message:
         sec, nanosec = divmod(to_ns(stamp), 1_000_000_000)
         time = self._type("builtin_interfaces/msg/Time")(sec, nanosec)
         count = self._counts.get(topic, 0)
@@ -87,7 +90,7 @@ class BagWriter:
         header = self._type("std_msgs/msg/Header")
         return header(count, time, frame) if self._is_ros1 else header(time, frame)
 
-    def _message(self, record: Record, header: Any) -> Any:
+    def _message(self, record: Record, header: Message) -> Message:
         match record:
             case ScanRecord():
                 return self._scan(record, header)
@@ -98,7 +101,7 @@ class BagWriter:
             case EncoderRecord():
                 return self._encoder(record, header)
 
-    def _scan(self, record: ScanRecord, header: Any) -> Any:
+    def _scan(self, record: ScanRecord, header: Message) -> Message:
         span = record.angle_increment * (len(record.ranges) - 1)
         return self._type("sensor_msgs/msg/LaserScan")(
             header=header,
@@ -113,12 +116,9 @@ class BagWriter:
             intensities=record.intensities,
         )
 
-    def _cloud(self, record: CloudRecord, header: Any) -> Any:
+    def _cloud(self, record: CloudRecord, header: Message) -> Message:
         field = self._type("sensor_msgs/msg/PointField")
-        fields = [
-            field(name, POINT.fields[name][1], _DATATYPES[POINT.fields[name][0].str], 1)
-            for name in POINT.names
-        ]
+        fields = [field(name, offset, datatype, 1) for name, offset, datatype in POINT_FIELDS]
         data = np.frombuffer(record.points.tobytes(), dtype=np.uint8)
         return self._type("sensor_msgs/msg/PointCloud2")(
             header=header,
@@ -132,7 +132,7 @@ class BagWriter:
             is_dense=True,
         )
 
-    def _imu(self, record: ImuRecord, header: Any) -> Any:
+    def _imu(self, record: ImuRecord, header: Message) -> Message:
         vector = self._type("geometry_msgs/msg/Vector3")
         unknown = np.zeros(9)
         # -1 says that there is no orientation (sensor_msgs/Imu).
@@ -147,7 +147,7 @@ class BagWriter:
             linear_acceleration_covariance=unknown,
         )
 
-    def _encoder(self, record: EncoderRecord, header: Any) -> Any:
+    def _encoder(self, record: EncoderRecord, header: Message) -> Message:
         return self._type("sensor_msgs/msg/JointState")(
             header=header,
             name=["motor"],

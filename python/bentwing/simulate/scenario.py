@@ -4,15 +4,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from bentwing.simulate.events import GAP, LEAD, EventName, Losses, Person, strong_bias
 from bentwing.simulate.heads.build import build_rig
 from bentwing.simulate.imu import PERFECT, Imu, ImuErrors
 from bentwing.simulate.lidars.interface import LidarClock
-from bentwing.simulate.ranging import Airframe, RangeErrors, Ranger
+from bentwing.simulate.ranging import Airframe, Mover, RangeErrors, Ranger
 from bentwing.simulate.scenes import SCENES, World
 from bentwing.simulate.stream import Sensors
 from bentwing.simulate.write import SimulatedRecording, write_recording
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 
     from bentwing.simulate.rig import Rig
 
-SceneName = Literal["courtyard", "office"]
+SceneName = Literal["courtyard", "office", "forest", "cave", "mine", "town"]
 HeadName = Literal["hokuyo-spin", "hokuyo-nod", "vlp16-fixed", "vlp16-motor"]
 Format = Literal["bag", "mcap", "db3"]
 
@@ -34,12 +35,13 @@ class Scenario(BaseModel):
     Attributes
     ----------
     scene : name of the world
-    head : sensor head and how it is moved
+    head : sensor head and how it is moved; by default `hokuyo-spin`, for a town `vlp16-motor`
     duration : s
     seed : varies geometry, motion, calibration and noise
     format : of the recording: a ROS 1 bag, or a ROS 2 folder with mcap or sqlite storage
     motor_rate : rad/s, of a motor-turned head
     max_range : m, beyond it the lidar sees nothing; by default what the sensor can do
+    events : what goes wrong
     noiseless : without random errors of the sensors (calibration and clock stay wrong)
     """
 
@@ -52,7 +54,29 @@ class Scenario(BaseModel):
     format: Format = "bag"
     motor_rate: float = Field(default=1.0, gt=0.0, le=10.0)
     max_range: float | None = Field(default=None, gt=1.0)
+    events: tuple[EventName, ...] = ()
     noiseless: bool = False
+
+    @model_validator(mode="before")
+    @classmethod
+    def _choose_head(cls, values: dict[str, Any]) -> dict[str, Any]:
+        """From 30 m above, a town is out of a Hokuyo's reach."""
+        if values.get("head") is None:
+            head = "vlp16-motor" if values.get("scene") == "town" else "hokuyo-spin"
+            return {**values, "head": head}
+        return values
+
+    def imu_errors(self) -> ImuErrors:
+        """Errors of the IMU."""
+        if self.noiseless:
+            return PERFECT
+        return strong_bias(ImuErrors()) if "strong-bias" in self.events else ImuErrors()
+
+    def range_errors(self, sigma: float) -> RangeErrors:
+        """Errors of a lidar with range noise `sigma` (m)."""
+        if self.noiseless:
+            return RangeErrors(0.0, resolution=0.0, dropout=0.0, mixing=0.0)
+        return RangeErrors(sigma)
 
     def rng(self, purpose: str) -> np.random.Generator:
         """Random numbers that depend on the seed and on what they are for."""
@@ -61,33 +85,60 @@ class Scenario(BaseModel):
 
 @dataclass(frozen=True, slots=True)
 class Setup:
-    """A scenario ready to be recorded."""
+    """A scenario ready to be recorded.
+
+    Attributes
+    ----------
+    first, last : s, what of the rig's motion is recorded
+    """
 
     world: World
     rig: Rig
     sensors: Sensors
+    first: float
+    last: float
 
 
 def prepare(scenario: Scenario) -> Setup:
-    """Builds the world, plans the flight and hangs the sensors on it."""
+    """Build the world, plan the motion and hang the sensors on it."""
+    first = LEAD if "motion-start" in scenario.events else 0.0
+    last = first + scenario.duration
     world = World(SCENES[scenario.scene](scenario.rng("scene")))
-    rig = build_rig(scenario, world)
-    lidar, rng = rig.head.lidar, scenario.rng("lidar")
-    errors = RangeErrors(lidar.noise)
-    if scenario.noiseless:
-        errors = RangeErrors(0.0, resolution=0.0, dropout=0.0, mixing=0.0)
-    ranger = Ranger(world, rig, errors, lidar.max_range, [Airframe(rig.head.airframe, rig)], rng)
-    imu_errors = PERFECT if scenario.noiseless else ImuErrors()
-    imu = Imu(imu_errors, scenario.rng("imu"), rig.carrier.activity)
+    rig = build_rig(scenario, world, last)
+    rng = scenario.rng("lidar")
     latency = float(rng.uniform(0.001, 0.004) * rng.choice([-1.0, 1.0]))
     clock = LidarClock(latency, 0.0 if scenario.noiseless else 1e-4)
-    return Setup(world, rig, Sensors(rig, ranger, imu, clock, rng))
+    imu = Imu(scenario.imu_errors(), scenario.rng("imu"), rig.carrier.activity)
+    ranger = Ranger(
+        world,
+        rig,
+        scenario.range_errors(rig.head.lidar.noise),
+        rig.head.lidar.max_range,
+        _movers(scenario, world, rig, 0.5 * (first + last)),
+        rng,
+    )
+    sensors = Sensors(rig, ranger, imu, clock, _losses(scenario, first, last), rng)
+    return Setup(world, rig, sensors, first, last)
+
+
+def _movers(scenario: Scenario, world: World, rig: Rig, middle: float) -> list[Mover]:
+    movers: list[Mover] = [Airframe(rig.head.airframe, rig)]
+    if "person" in scenario.events:
+        near = rig.imu(np.array([middle])).p[0]
+        movers.append(Person(world, scenario.rng("person"), near))
+    return movers
+
+
+def _losses(scenario: Scenario, first: float, last: float) -> Losses:
+    at = first + 0.6 * (last - first)
+    gap = (at, at + GAP) if "gap" in scenario.events else None
+    return Losses(scenario.rng("losses"), gap, bursts="dropped-packets" in scenario.events)
 
 
 def simulate(
     scenario: Scenario, out: Path, progress: Callable[[float], None] | None = None
 ) -> SimulatedRecording:
-    """Writes the recording, its `payload.yaml` and the truth into the folder `out`.
+    """Write the recording, its `payload.yaml` and the truth into the folder `out`.
 
     Parameters
     ----------

@@ -33,8 +33,8 @@ _BASIS = _basis()
 class Spline:
     """A smooth function of time that follows its control points.
 
-    It stays inside the hull of six neighbouring control points and is exactly constant where
-    those are equal, so a carrier that does not move does not move at all.
+    It stays inside the hull of six neighbouring control points and is constant where those
+    are equal, so a carrier at rest does not move at all.
 
     Attributes
     ----------
@@ -61,9 +61,10 @@ class Spline:
         powers = np.zeros((len(u), DEGREE + 1))
         for k in range(derivative, DEGREE + 1):
             powers[:, k] = factorial(k) / factorial(k - derivative) * u ** (k - derivative)
-        return powers @ _BASIS / self.step**derivative
+        weights: NDArray[np.float64] = powers @ _BASIS / self.step**derivative
+        return weights
 
 
 def knot_times(step: float, duration: float) -> NDArray[np.float64]:
-    """Times of the control points of a spline over 0 … `duration`, with a margin at the end."""
-    return np.arange(int(np.ceil(duration / step)) + DEGREE) * step
+    """Return times of the control points of a spline over 0 … `duration`, with a margin at the end."""
+    return np.arange(float(np.ceil(duration / step) + DEGREE)) * step

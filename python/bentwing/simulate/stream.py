@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from bentwing.simulate.events import Losses
     from bentwing.simulate.lidars.interface import LidarClock
     from bentwing.simulate.ranging import Ranger
     from bentwing.simulate.rig import Encoder, Rig
@@ -35,19 +36,23 @@ class Sensors:
     ranger: Ranger
     imu: Imu
     clock: LidarClock
+    losses: Losses
     rng: np.random.Generator
 
-    def stream(self, duration: float) -> Iterator[tuple[float, float, list[Record]]]:
-        """Start, end and records of about a second at a time, records in order of arrival."""
+    def stream(self, first: float, last: float) -> Iterator[tuple[float, float, list[Record]]]:
+        """Measure from `first` to `last`, about a second at a time.
+
+        Yields start, end and the records that arrived until then, in order of arrival.
+        """
         pending: list[Record] = []
-        for start in np.arange(0.0, duration, CHUNK).tolist():
-            end = min(start + CHUNK, duration)
+        for start in np.arange(first, last, CHUNK).tolist():
+            end = min(start + CHUNK, last)
             pending += self._measure(start, end)
             pending.sort(key=lambda record: record.arrival)
             # What is measured later also arrives later than `end`.
-            is_last = end >= duration
+            is_last = end >= last
             n_ready = len(pending) if is_last else sum(r.arrival <= end for r in pending)
-            yield start, end, pending[:n_ready]
+            yield start, end, self.losses.remaining(pending[:n_ready])
             pending = pending[n_ready:]
 
     def _measure(self, start: float, end: float) -> list[Record]:

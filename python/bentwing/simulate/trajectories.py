@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bentwing.errors import UsageError
+from bentwing.simulate.events import gust_shifts
 from bentwing.simulate.kinematics import Motion, translating
 from bentwing.simulate.planner import Tour, plan_tour
 from bentwing.simulate.splines import Spline, knot_times
@@ -76,7 +77,7 @@ class Flight:
     phases: Phases
 
     def motion(self, times: Array) -> Motion:
-        """The body's motion at `times`."""
+        """Return the body's motion at `times`."""
         body = translating(self.position, times)
         for axis, angle in ((Z, self.yaw), (Y, self.pitch), (X, self.roll)):
             body = body.turned(axis, angle, times)
@@ -88,32 +89,42 @@ class Flight:
 
 
 def quadrotor_flight(
-    world: World, rng: np.random.Generator, duration: float, speed: float, ground_clearance: float
+    world: World, rng: np.random.Generator, duration: float, ground_clearance: float, *, gusts: bool
 ) -> Flight:
-    """Rest, take-off, a tour at about `speed` m/s and landing where it began.
+    """Rest, take off, fly a tour at about the site's speed and land where it began.
 
     `ground_clearance` is the height of the body's origin above the pad when standing. The tour
     keeps 0.8 m from every surface, which is verified on the final curve.
     """
+    cruise = duration - 11.0 - 2.2 * _climb_time(world.site.low[2])
     for _ in range(ATTEMPTS):
-        tour = plan_tour(world, rng, speed * max(duration - 20.0, 3.0), 1.0)
+        tour = plan_tour(world, rng, world.site.speed * max(cruise, 3.0), 1.0)
         phases = _phases(rng, duration, tour.way_points[0, 2] - tour.pad[2])
         position = _position(rng, tour, phases, duration, ground_clearance)
+        if gusts:
+            position = _pushed(rng, position, phases)
         if _is_clear(world, position, phases):
             return _with_attitude(rng, position, phases, duration)
     msg = f"no flight 0.8 m away from every surface was found in {ATTEMPTS} attempts: try another seed"
     raise UsageError(msg)
 
 
+def _climb_time(height: float) -> float:
+    """Slow near the ground, up to 2 m/s on a long way up."""
+    return max(2.5, height / 1.2) if height < 6.0 else 5.0 + (height - 6.0) / 2.0
+
+
 def _phases(rng: np.random.Generator, duration: float, height: float) -> Phases:
     rotors = rng.uniform(3.5, 5.0)
     climb = rotors + rng.uniform(2.5, 3.5)
-    rise = max(2.5, height / 1.2)
+    rise = _climb_time(height)
     touch = duration - 3.5
     phases = Phases(rotors, climb, climb + rise, touch - 1.2 * rise, touch, touch + 2.0)
     if phases.descent - phases.cruise < 2.0:
         shortest = duration + 2.0 - (phases.descent - phases.cruise)
-        msg = f"a flight here takes at least {np.ceil(shortest):.0f} s, {duration:g} s were asked for"
+        msg = (
+            f"a flight here takes at least {np.ceil(shortest):.0f} s, {duration:g} s were asked for"
+        )
         raise UsageError(msg)
     return phases
 
@@ -125,13 +136,19 @@ def _position(
     # Every corner costs as much time as 0.4 m of way, so that the carrier slows down there.
     costs = np.cumsum(np.concatenate([[0.0], steps + 0.4]))
     cruise = phases.cruise + costs / costs[-1] * (phases.descent - phases.cruise)
-    parked = tour.pad + [0.0, 0.0, ground_clearance]
+    parked = tour.pad + np.array([0.0, 0.0, ground_clearance])
     times = np.concatenate([[0.0, phases.climb], cruise, [phases.touch, duration]])
     points = np.vstack([parked, parked, tour.way_points, parked, parked])
     knots = knot_times(POSITION_STEP, duration)
     controls = np.column_stack([np.interp(knots, times, points[:, i]) for i in range(3)])
     wobble = rng.normal(0.0, WOBBLE, controls.shape) * [1.0, 1.0, 0.7]
     return Spline(POSITION_STEP, controls + wobble * phases.airborne(knots)[:, None])
+
+
+def _pushed(rng: np.random.Generator, position: Spline, phases: Phases) -> Spline:
+    knots = POSITION_STEP * np.arange(float(len(position.controls)))
+    shifts = gust_shifts(rng, knots, phases.cruise + 1.0, phases.descent - 1.0)
+    return Spline(POSITION_STEP, position.controls + shifts)
 
 
 def _is_clear(world: World, position: Spline, phases: Phases) -> bool:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bentwing.simulate.rig import Rig
-    from bentwing.simulate.scenario import Setup
+    from bentwing.simulate.scenario import Scenario, Setup
     from bentwing.simulate.scenes.mesh import Mesh
 
     Array = NDArray[np.float64]
@@ -28,7 +28,7 @@ IMU_TOPIC, ENCODER_TOPIC = "/imu", "/encoder"
 
 
 def write_yaml(path: Path, content: dict[str, Any]) -> None:
-    """Writes a small mapping, in its own order."""
+    """Write a small mapping, in its own order."""
     path.write_text(yaml.safe_dump(content, sort_keys=False, default_flow_style=None))
 
 
@@ -42,7 +42,7 @@ def write_poses(file: TextIO, rig: Rig, times: Array) -> None:
 
 
 def write_ply(path: Path, mesh: Mesh) -> None:
-    """The scene as a binary PLY mesh, double precision."""
+    """Return the scene as a binary PLY mesh, double precision."""
     header = (
         "ply\nformat binary_little_endian 1.0\n"
         f"element vertex {len(mesh.vertices)}\n"
@@ -56,9 +56,9 @@ def write_ply(path: Path, mesh: Mesh) -> None:
     path.write_bytes(header.encode() + vertices.tobytes() + faces.tobytes())
 
 
-def payload(setup: Setup, seed: int) -> dict[str, Any]:
-    """The head as its user believes it to be."""
-    errors = ImuErrors()
+def payload(setup: Setup, scenario: Scenario) -> dict[str, Any]:
+    """Return the head as its user believes it to be."""
+    errors = scenario.imu_errors() if not scenario.noiseless else ImuErrors()
     gyro_noise, accel_noise = errors.densities()
     imu = {
         "topic": IMU_TOPIC,
@@ -68,11 +68,11 @@ def payload(setup: Setup, seed: int) -> dict[str, Any]:
         "accel_bias_walk": errors.accel_bias_walk,
     }
     head = dict(setup.rig.head.payload)
-    return {"name": f"simulated-{seed}", "lidar": head.pop("lidar"), "imu": imu, **head}
+    return {"name": f"simulated-{scenario.head}", "lidar": head.pop("lidar"), "imu": imu, **head}
 
 
 def calibration(setup: Setup, first_biases: Array, last_biases: Array) -> dict[str, Any]:
-    """What a perfect calibration would find."""
+    """Return what a perfect calibration would find."""
     biases = {
         when: {
             "gyro": [round(float(b), 9) for b in values[:3]],

@@ -13,7 +13,7 @@ from bentwing.simulate.heads.rates import ornstein_uhlenbeck
 from bentwing.simulate.kinematics import Motion, translating
 from bentwing.simulate.planner import Tour, plan_tour
 from bentwing.simulate.splines import Spline, knot_times
-from bentwing.simulate.trajectories import ATTEMPTS, X, Y, Z, smooth_heading, smoothstep
+from bentwing.simulate.trajectories import ATTEMPTS, Y, Z, smooth_heading, smoothstep
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -46,7 +46,7 @@ class Walk:
     end: float
 
     def motion(self, times: Array) -> Motion:
-        """The hand's motion at `times`."""
+        """Return the hand's motion at `times`."""
         return (
             translating(self.position, times).turned(Z, self.yaw, times).turned(Y, self.sway, times)
         )
@@ -85,8 +85,10 @@ def walk(world: World, rng: np.random.Generator, duration: float) -> Walk:
     return Walk(position, yaw, sway, start, end)
 
 
-def _position(rng: np.random.Generator, tour: Tour, start: float, end: float, duration: float) -> Spline:
-    """The tour, evenly walked and rounded over a second, with the gait on top."""
+def _position(
+    rng: np.random.Generator, tour: Tour, start: float, end: float, duration: float
+) -> Spline:
+    """Return the tour, evenly walked and rounded over a second, with the gait on top."""
     lengths = np.linalg.norm(np.diff(tour.way_points, axis=0), axis=1)
     way = np.concatenate([[0.0], np.cumsum(lengths)])
     knots = knot_times(STEP, duration)
@@ -95,7 +97,9 @@ def _position(rng: np.random.Generator, tour: Tour, start: float, end: float, du
     width = 20
     padded = np.pad(points, ((width, width), (0, 0)), mode="edge")
     window = np.hanning(2 * width + 3)[1:-1]
-    smooth = np.column_stack([np.convolve(c, window / window.sum(), mode="valid") for c in padded.T])
+    smooth = np.column_stack(
+        [np.convolve(c, window / window.sum(), mode="valid") for c in padded.T]
+    )
     envelope = smoothstep((knots - start) / 1.5) * smoothstep((end - knots) / 1.5)
     phase = 2 * np.pi * STEPS_HZ * knots + 0.3 * ornstein_uhlenbeck(rng, len(knots), STEP, 2.0, 1.0)
     smooth[:, 2] += 0.02 * envelope * np.sin(phase)

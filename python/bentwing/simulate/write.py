@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from bentwing.simulate.rig import Rig
     from bentwing.simulate.scenario import Scenario, Setup
 
+
 @dataclass(frozen=True, slots=True)
 class SimulatedRecording:
     """Where everything was written.
@@ -56,16 +57,16 @@ def write_recording(
     """Streams the setup's sensors into a bag and writes the truth beside it."""
     files = _files(out, scenario.format)
     write_yaml(files.scenario, scenario.model_dump(mode="json"))
-    write_yaml(files.payload, payload(setup, scenario.seed))
+    write_yaml(files.payload, payload(setup, scenario))
     write_ply(files.scene, setup.world.site.mesh)
     biases = [setup.sensors.imu.biases.copy()]
     with BagWriter(files.recording, scenario.format) as bag, files.trajectory.open("w") as truth:
-        for start, end, records in setup.sensors.stream(scenario.duration):
+        for start, end, records in setup.sensors.stream(setup.first, setup.last):
             for record in records:
                 bag.write(*_topic_and_frame(record, setup.rig), record)
             write_poses(truth, setup.rig, ticks(start, end, RATE_HZ))
             if progress:
-                progress(end)
+                progress(end - setup.first)
     biases.append(setup.sensors.imu.biases.copy())
     write_yaml(files.calibration, calibration(setup, *biases))
     return files

@@ -47,7 +47,17 @@ def spinning(rate):
     ids=["rest", "handheld", "spin 1", "spin 6", "spin 20", "spin about the vertical"],
 )
 def test_a_valid_imu_is_never_refused(rates):
-    assert imu_units.problems(*moving_imu(rates)) == []
+    samples = moving_imu(rates)
+    assert imu_units.problems(*samples) == []
+    assert imu_units.mirrored_axis(*samples) is None
+
+
+def test_a_head_swung_like_a_pendulum_is_not_refused():
+    """Below its pivot and faster than free, apparent gravity turns against the gyro."""
+    times, gyro, accel = moving_imu(lambda t: (0.0, 2.0 * np.cos(7 * t), 0.0))
+    lever = 0.4
+    accel[:, 0] -= lever * np.gradient(gyro[:, 1], times)
+    assert imu_units.problems(times, gyro, accel) == []
 
 
 @pytest.mark.parametrize("turn", [(1, 1, -1), (1, -1, -1), (-1, 1, -1)])
@@ -73,6 +83,14 @@ def test_accelerations_of_zero_and_raw_counts_are_refused():
     times, gyro, accel = moving_imu(resting)
     assert "all zero" in imu_units.problems(times, gyro, accel * 0)[0]
     assert "check the unit" in imu_units.problems(times, gyro, accel * 1670)[0]
+
+
+def test_centrifugal_force_far_off_the_axis_is_not_a_unit():
+    times, gyro, accel = moving_imu(spinning(15.0))
+    lever = np.array([0.0, 0.0, 0.35])
+    accel += np.cross(gyro, np.cross(gyro, lever))
+    assert np.median(np.linalg.norm(accel, axis=1)) > 60
+    assert imu_units.problems(times, gyro, accel) == []
 
 
 def test_vibration_of_a_drone_is_not_a_unit():
@@ -105,8 +123,7 @@ def test_rates_beyond_every_gyro_are_degrees():
 def test_a_mirrored_gyro_axis_is_named(axis):
     times, gyro, accel = moving_imu(handheld)
     gyro[:, axis] *= -1
-    (problem,) = imu_units.problems(times, gyro, accel)
-    assert f"axis {'xyz'[axis]}" in problem
+    assert f"axis {'xyz'[axis]}" in imu_units.mirrored_axis(times, gyro, accel)
 
 
 def test_a_few_samples_tell_nothing():

@@ -7,55 +7,59 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bentwing.simulate.events import turning
 from bentwing.simulate.heads.airframe import LEG_LENGTH
 from bentwing.simulate.heads.hokuyo_nod import NOD_STEP, hokuyo_nod
 from bentwing.simulate.heads.hokuyo_spin import hokuyo_spin
 from bentwing.simulate.heads.rates import SPIN_STEP, spin_angle, spin_drive
-from bentwing.simulate.heads.vlp16 import vlp16_fixed, vlp16_motor
-from bentwing.simulate.rig import Rig
+from bentwing.simulate.heads.vlp16 import MOTOR_STEP, vlp16_fixed, vlp16_motor
+from bentwing.simulate.rig import Head, Rig
 from bentwing.simulate.splines import knot_times
 from bentwing.simulate.trajectories import Flight, quadrotor_flight
 from bentwing.simulate.walk import walk
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from bentwing.simulate.scenario import Scenario
     from bentwing.simulate.scenes import World
+
+    Array = NDArray[np.float64]
 
 HOKUYO_RANGE, VLP16_RANGE = 30.0, 100.0
 
 
-def build_rig(scenario: Scenario, world: World) -> Rig:
-    """Carry the scenario's head through `world`."""
-    match scenario.head:
-        case "hokuyo-spin":
-            return _spun(scenario, world)
-        case "hokuyo-nod":
-            return _nodding(scenario, world)
-        case "vlp16-fixed":
-            max_range = scenario.max_range or VLP16_RANGE
-            return Rig(_flight(scenario, world), vlp16_fixed(scenario.rng("head"), max_range))
-        case "vlp16-motor":
-            max_range = scenario.max_range or VLP16_RANGE
-            rate, duration = scenario.motor_rate, scenario.duration
-            head = vlp16_motor(scenario.rng("head"), rate, duration, max_range)
-            return Rig(_flight(scenario, world), head)
+def build_rig(scenario: Scenario, world: World, duration: float) -> Rig:
+    """Carry the scenario's head through `world` for `duration` s."""
+    rng = scenario.rng("head")
+    if scenario.head == "hokuyo-nod":
+        return _nodding(scenario, world, rng, duration)
+    gusts = "gusts" in scenario.events
+    flight = quadrotor_flight(world, scenario.rng("flight"), duration, LEG_LENGTH, gusts=gusts)
+    if scenario.head == "hokuyo-spin":
+        return Rig(flight, _spun(scenario, flight, rng, duration))
+    max_range = scenario.max_range or VLP16_RANGE
+    if scenario.head == "vlp16-fixed":
+        return Rig(flight, vlp16_fixed(rng, max_range))
+    drive = _drive(scenario, MOTOR_STEP, duration)
+    return Rig(flight, vlp16_motor(rng, scenario.motor_rate, drive, max_range))
 
 
-def _flight(scenario: Scenario, world: World) -> Flight:
-    rng, speed = scenario.rng("flight"), world.site.speed
-    return quadrotor_flight(world, rng, scenario.duration, speed, LEG_LENGTH)
-
-
-def _spun(scenario: Scenario, world: World) -> Rig:
-    rng, flight = scenario.rng("head"), _flight(scenario, world)
-    drive = spin_drive(flight.activity(knot_times(SPIN_STEP, scenario.duration)))
+def _spun(scenario: Scenario, flight: Flight, rng: np.random.Generator, duration: float) -> Head:
+    drive = spin_drive(flight.activity(knot_times(SPIN_STEP, duration)))
     mean = np.radians(rng.uniform(220.0, 320.0))
-    spin = spin_angle(rng, mean, drive, scenario.duration)
-    return Rig(flight, hokuyo_spin(rng, spin, scenario.max_range or HOKUYO_RANGE))
+    spin = spin_angle(rng, mean, drive * _drive(scenario, SPIN_STEP, duration))
+    return hokuyo_spin(rng, spin, scenario.max_range or HOKUYO_RANGE)
 
 
-def _nodding(scenario: Scenario, world: World) -> Rig:
-    carrier = walk(world, scenario.rng("walk"), scenario.duration)
-    walking = carrier.walking(knot_times(NOD_STEP, scenario.duration))
-    max_range = scenario.max_range or HOKUYO_RANGE
-    return Rig(carrier, hokuyo_nod(scenario.rng("head"), walking, scenario.duration, max_range))
+def _nodding(scenario: Scenario, world: World, rng: np.random.Generator, duration: float) -> Rig:
+    carrier = walk(world, scenario.rng("walk"), duration)
+    walking = carrier.walking(knot_times(NOD_STEP, duration))
+    drive = walking * _drive(scenario, NOD_STEP, duration)
+    return Rig(carrier, hokuyo_nod(rng, drive, scenario.max_range or HOKUYO_RANGE))
+
+
+def _drive(scenario: Scenario, step: float, duration: float) -> Array:
+    """How much the head is driven at the knots of its angle, 0 … 1."""
+    knots = knot_times(step, duration)
+    return turning(knots, duration) if "spin-stall" in scenario.events else np.ones(len(knots))

@@ -16,7 +16,7 @@ from bentwing.simulate.heads.rates import ornstein_uhlenbeck
 from bentwing.simulate.lidars.hokuyo import Hokuyo
 from bentwing.simulate.rig import Head
 from bentwing.simulate.scenes.mesh import Mesh, box, merge
-from bentwing.simulate.splines import Spline, knot_times
+from bentwing.simulate.splines import Spline
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -27,12 +27,12 @@ NOD_STEP = 0.05
 SELF_HITS = {"box": {"min": [-0.9, -0.5, -0.1], "max": [0.0, 0.5, 0.1]}}
 
 
-def hokuyo_nod(rng: np.random.Generator, walking: Array, duration: float, max_range: float) -> Head:
-    """The nodding head; `walking` (0 … 1 at the knots of `NOD_STEP`) drives the spring."""
+def hokuyo_nod(rng: np.random.Generator, drive: Array, max_range: float) -> Head:
+    """Build the nodding head; `drive` (0 … 1 at the knots of `NOD_STEP`) shakes the spring."""
     lidar = Hokuyo(max_range=max_range)
     nominal = Mount(np.eye(3), np.array([0.01, 0.0, 0.06]))
     true = nominal.perturbed(rng, np.radians(0.5), 0.004)
-    nod, roll = _swing(rng, walking, duration)
+    nod, roll = _swing(rng, drive)
     on_spring = Mount(np.eye(3), np.array([0.0, 0.0, 0.12]))
     return Head(
         to_imu=[Turn(np.array([0.0, 1.0, 0.0]), nod), Turn(np.array([1.0, 0, 0]), roll), on_spring],
@@ -54,9 +54,9 @@ def hokuyo_nod(rng: np.random.Generator, walking: Array, duration: float, max_ra
     )
 
 
-def _swing(rng: np.random.Generator, walking: Array, duration: float) -> tuple[Spline, Spline]:
+def _swing(rng: np.random.Generator, drive: Array) -> tuple[Spline, Spline]:
     """Nodding by about ±50° at about 1 Hz, both irregular, and a smaller sideways swing."""
-    n = len(knot_times(NOD_STEP, duration))
+    n = len(drive)
     frequency = 1.0 + ornstein_uhlenbeck(rng, n, NOD_STEP, 2.0, 0.08)
     amplitude = np.radians(50.0 + ornstein_uhlenbeck(rng, n, NOD_STEP, 1.5, 7.0))
     phase = 2 * np.pi * np.cumsum(frequency) * NOD_STEP
@@ -64,9 +64,7 @@ def _swing(rng: np.random.Generator, walking: Array, duration: float) -> tuple[S
     roll = np.radians(6.0) * np.sin(0.5 * phase + 1.0) + np.radians(
         ornstein_uhlenbeck(rng, n, NOD_STEP, 0.5, 2.0)
     )
-    nod_spline, roll_spline = (
-        Spline(NOD_STEP, (angle * walking)[:, None]) for angle in (nod, roll)
-    )
+    nod_spline, roll_spline = (Spline(NOD_STEP, (angle * drive)[:, None]) for angle in (nod, roll))
     return nod_spline, roll_spline
 
 

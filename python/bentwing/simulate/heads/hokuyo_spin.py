@@ -26,7 +26,7 @@ SELF_HITS = {"box": {"min": [-0.3, -0.62, -0.62], "max": [0.32, 0.62, 0.62]}}
 
 
 def hokuyo_spin(rng: np.random.Generator, spin: Spline, max_range: float) -> Head:
-    """The bentwing payload, turned by `spin` about the carrier's z."""
+    """Build the bentwing payload, turned by `spin` about the carrier's z."""
     lidar = Hokuyo(max_range=max_range)
     T_spin_imu = Mount(np.eye(3), np.array([0.02, -0.01, -0.16]))
     nominal = Mount(DOWN_LOOKING, np.array([0.06, 0.01, 0.04]))

@@ -42,7 +42,7 @@ class Mount:
         return motion.mounted(self.R, self.t)
 
     def perturbed(self, rng: np.random.Generator, angle: float, shift: float) -> Mount:
-        """Turned by about `angle` (rad) and shifted by about `shift` (m) in random directions."""
+        """Return the mount turned by about `angle` (rad) and shifted by about `shift` (m) in random directions."""
         phi, t = (_direction(rng) * rng.uniform(0.7, 1.3) * size for size in (angle, shift))
         return Mount(self.R @ rotation(phi[None])[0], self.t + t)
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing.simulate.splines import Spline, knot_times
+from bentwing.simulate.splines import Spline
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -21,7 +21,7 @@ SPIN_RANGE = np.radians([180.0, 460.0])
 def ornstein_uhlenbeck(
     rng: np.random.Generator, n: int, step: float, relaxation: float, sigma: float
 ) -> Array:
-    """A random process (n,) with zero mean, standard deviation `sigma` and memory `relaxation`."""
+    """Draw a random process (n,) with zero mean, standard deviation `sigma` and memory `relaxation`."""
     decay = np.exp(-step / relaxation)
     shocks = rng.normal(0.0, sigma * np.sqrt(1 - decay**2), n)
     values = np.empty(n)
@@ -32,7 +32,7 @@ def ornstein_uhlenbeck(
     return values
 
 
-def spin_angle(rng: np.random.Generator, mean: float, drive: Array, duration: float) -> Spline:
+def spin_angle(rng: np.random.Generator, mean: float, drive: Array) -> Spline:
     """Angle of a payload spun by the downdraft, about the carrier's vertical axis.
 
     Parameters
@@ -40,8 +40,7 @@ def spin_angle(rng: np.random.Generator, mean: float, drive: Array, duration: fl
     mean : rad/s, mean rate
     drive : (K,) 0 … 1 at the knots of `SPIN_STEP`, share of the full rate
     """
-    n = len(knot_times(SPIN_STEP, duration))
-    wander = ornstein_uhlenbeck(rng, n, SPIN_STEP, 4.0, np.radians(25.0))
+    wander = ornstein_uhlenbeck(rng, len(drive), SPIN_STEP, 4.0, np.radians(25.0))
     rate = np.clip(mean + wander, *SPIN_RANGE) * drive
     angle = rng.uniform(0.0, 2 * np.pi) + np.cumsum(rate) * SPIN_STEP
     return Spline(SPIN_STEP, angle[:, None])

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bentwing.simulate.heads.airframe import quadrotor
-from bentwing.simulate.heads.joints import Mount, Turn
+from bentwing.simulate.heads.joints import Joint, Mount, Turn
 from bentwing.simulate.lidars.vlp16 import Vlp16
 from bentwing.simulate.rig import Encoder, Head
-from bentwing.simulate.splines import Spline, knot_times
+from bentwing.simulate.splines import Spline
 
 if TYPE_CHECKING:
     from typing import Any
@@ -33,7 +33,7 @@ MOTOR_STEP = 0.1
 
 
 def vlp16_fixed(rng: np.random.Generator, max_range: float) -> Head:
-    """The lidar level under the body."""
+    """Build the lidar level under the body."""
     lidar = Vlp16(max_range=max_range)
     nominal = Mount(np.eye(3), np.array([0.02, 0.0, -0.14]))
     true = nominal.perturbed(rng, np.radians(0.5), 0.004)
@@ -46,15 +46,15 @@ def vlp16_fixed(rng: np.random.Generator, max_range: float) -> Head:
     return Head([T_body_imu], [true], quadrotor(), lidar, payload, truth)
 
 
-def vlp16_motor(rng: np.random.Generator, rate: float, duration: float, max_range: float) -> Head:
-    """The lidar on a motor that turns at `rate` rad/s, with an encoder."""
+def vlp16_motor(rng: np.random.Generator, rate: float, drive: Array, max_range: float) -> Head:
+    """Build the lidar on a motor that turns at `rate` rad/s times `drive` (at the knots of `MOTOR_STEP`)."""
     lidar = Vlp16(max_range=max_range)
     motor = Mount(np.eye(3), np.array([0.0, 0.0, -0.10]))
     nominal = Mount(ON_ITS_SIDE, np.array([0.0, 0.0, -0.07]))
     # What is unknown of T_imu_lidar sits before the motor, the misalignment behind it.
     true_motor = motor.perturbed(rng, np.radians(0.3), 0.003)
     true = nominal.perturbed(rng, np.radians(0.25), 0.002)
-    angle = _motor_angle(rng, rate, duration)
+    angle = _motor_angle(rng, rate, drive)
     encoder = Encoder(angle, zero=float(rng.uniform(-0.004, 0.004)), sigma=2e-4)
     payload = {
         "lidar": _lidar(lidar),
@@ -62,7 +62,7 @@ def vlp16_motor(rng: np.random.Generator, rate: float, duration: float, max_rang
         "encoder": {"topic": "/encoder", "axis": AXIS.tolist(), **_motor(motor, nominal)},
     }
     truth = {"encoder": _motor(true_motor, true), "encoder_zero": round(encoder.zero, 9)}
-    joints = [true_motor, Turn(AXIS, angle), true]
+    joints: list[Joint] = [true_motor, Turn(AXIS, angle), true]
     return Head([T_body_imu], joints, quadrotor(), lidar, payload, truth, encoder)
 
 
@@ -80,10 +80,9 @@ def _motor(T_imu_motor: Mount, T_motor_lidar: Mount) -> dict[str, Any]:
     return {"T_imu_motor": T_imu_motor.as_dict(), "T_motor_lidar": T_motor_lidar.as_dict()}
 
 
-def _motor_angle(rng: np.random.Generator, rate: float, duration: float) -> Spline:
-    """From rest to `rate` within about a second, then with half a percent of ripple."""
-    knots = knot_times(MOTOR_STEP, duration)
-    drive = np.clip((knots - 1.0) / 1.0, 0.0, 1.0)
-    speed = rate * drive * (1.0 + rng.normal(0.0, 0.005, len(knots)))
+def _motor_angle(rng: np.random.Generator, rate: float, drive: Array) -> Spline:
+    """From rest to full speed within a second, then with half a percent of ripple."""
+    ramp = np.clip(MOTOR_STEP * np.arange(len(drive)) - 1.0, 0.0, 1.0)
+    speed = rate * drive * ramp * (1.0 + rng.normal(0.0, 0.005, len(drive)))
     angle = rng.uniform(0.0, 2 * np.pi) + np.cumsum(speed) * MOTOR_STEP
     return Spline(MOTOR_STEP, angle[:, None])

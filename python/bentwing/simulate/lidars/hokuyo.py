@@ -35,7 +35,7 @@ class Hokuyo:
     noise: float = 0.01
 
     def beams(self, start: float, end: float) -> Beams | None:
-        """Scans that begin in [start, end)."""
+        """Return scans that begin in [start, end)."""
         first, last = (int(np.ceil((t - PHASE) / PERIOD - 1e-9)) for t in (start, end))
         if last <= first:
             return None

@@ -41,8 +41,20 @@ class LidarClock:
 class Lidar(Protocol):
     """A scanner: its pattern of beams, and how it reports ranges."""
 
-    topic: str
-    noise: float
+    @property
+    def topic(self) -> str:
+        """Where it publishes."""
+        ...
+
+    @property
+    def noise(self) -> float:
+        """Standard deviation of its ranges, m."""
+        ...
+
+    @property
+    def max_range(self) -> float:
+        """Range up to which it sees anything, m."""
+        ...
 
     def beams(self, start: float, end: float) -> Beams | None:
         """Beams of all sweeps that begin in [start, end), s; None if there are none."""
@@ -56,5 +68,5 @@ class Lidar(Protocol):
         clock: LidarClock,
         rng: np.random.Generator,
     ) -> list[Record]:
-        """The sweeps as they are recorded."""
+        """Return the sweeps as they are recorded."""
         ...

@@ -42,8 +42,8 @@ class Vlp16:
         first, last = (int(np.ceil((t - PHASE) / PERIOD - 1e-9)) for t in (start, end))
         if last <= first:
             return None
-        begins = PHASE + PERIOD * np.arange(first, last)
-        since = FIRING * np.arange(N_FIRINGS)[:, None] + SHOT * np.arange(16)
+        begins = PHASE + PERIOD * np.arange(float(first), float(last))
+        since = FIRING * np.arange(float(N_FIRINGS))[:, None] + SHOT * np.arange(16.0)
         azimuth = -2 * np.pi * since / PERIOD
         elevation = np.radians(-15.0 + 2.0 * np.array(ORDER))
         flat = np.cos(elevation)
@@ -67,7 +67,9 @@ class Vlp16:
         stamps = clock.stamps(beams.times[::N_FIRINGS, 0], rng)
         delays = TRANSPORT + rng.exponential(0.002, len(stamps))
         return [
-            CloudRecord(stamp, beams.times[rows[-1], -1] + delay, _points(beams, ranges, cosines, rows))
+            CloudRecord(
+                stamp, beams.times[rows[-1], -1] + delay, _points(beams, ranges, cosines, rows)
+            )
             for stamp, delay, rows in zip(stamps, delays, revolutions, strict=True)
         ]
 

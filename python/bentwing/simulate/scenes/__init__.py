@@ -5,8 +5,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from bentwing.simulate.scenes.cave import cave
 from bentwing.simulate.scenes.courtyard import courtyard
+from bentwing.simulate.scenes.forest import forest
+from bentwing.simulate.scenes.mine import mine
 from bentwing.simulate.scenes.office import office
+from bentwing.simulate.scenes.town import town
 from bentwing.simulate.scenes.world import Site, World
 
 if TYPE_CHECKING:
@@ -19,4 +23,8 @@ __all__ = ["SCENES", "Site", "World"]
 SCENES: dict[str, Callable[[np.random.Generator], Site]] = {
     "courtyard": courtyard,
     "office": office,
+    "forest": forest,
+    "cave": cave,
+    "mine": mine,
+    "town": town,
 }

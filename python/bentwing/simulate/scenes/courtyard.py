@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from bentwing.simulate.scenes.mesh import Mesh, box, gable, ground, merge, smooth_noise

@@ -31,14 +31,10 @@ class Mesh:
     triangles: NDArray[np.uint32]
 
     def moved(self, at: ArrayLike, yaw: float = 0.0) -> Mesh:
-        """Turned about the vertical axis through the origin, then shifted by `at`."""
+        """Return the mesh turned about the vertical axis through the origin, then shifted by `at`."""
         c, s = np.cos(yaw), np.sin(yaw)
         turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
         return Mesh(self.vertices @ turn.T + np.asarray(at), self.triangles)
-
-    def flipped(self) -> Mesh:
-        """Seen from the other side."""
-        return Mesh(self.vertices, np.ascontiguousarray(self.triangles[:, ::-1]))
 
 
 def merge(meshes: Iterable[Mesh]) -> Mesh:
@@ -51,7 +47,7 @@ def merge(meshes: Iterable[Mesh]) -> Mesh:
 
 
 def box(low: ArrayLike, high: ArrayLike) -> Mesh:
-    """An axis-aligned box seen from outside."""
+    """Build an axis-aligned box seen from outside."""
     corners = np.array(np.meshgrid([0, 1], [0, 1], [0, 1], indexing="ij")).reshape(3, 8).T
     low, high = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
     faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
@@ -60,13 +56,13 @@ def box(low: ArrayLike, high: ArrayLike) -> Mesh:
 
 
 def quad(corners: ArrayLike) -> Mesh:
-    """A flat four-cornered face, corners counter-clockwise."""
+    """Build a flat four-cornered face, corners counter-clockwise."""
     triangles = np.array([[0, 1, 2], [0, 2, 3]], dtype=np.uint32)
     return Mesh(np.asarray(corners, dtype=np.float64), triangles)
 
 
 def sheet(points: Array) -> Mesh:
-    """A surface through a grid of points (A, B, 3), facing `∂/∂A × ∂/∂B`."""
+    """Build a surface through a grid of points (A, B, 3), facing `∂/∂A × ∂/∂B`."""
     n_a, n_b = points.shape[:2]
     index = np.arange(n_a * n_b, dtype=np.uint32).reshape(n_a, n_b)
     p, q, r, s = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
@@ -75,7 +71,7 @@ def sheet(points: Array) -> Mesh:
 
 
 def ground(x: tuple[float, float], y: tuple[float, float], step: float, height: Field) -> Mesh:
-    """A height field over a rectangle; `height` maps (N, 2) to (N,)."""
+    """Build a height field over a rectangle; `height` maps (N, 2) to (N,)."""
     nx, ny = (int(np.ceil((b - a) / step)) + 1 for a, b in (x, y))
     xy = np.stack(np.meshgrid(np.linspace(*x, nx), np.linspace(*y, ny), indexing="ij"), axis=-1)
     z = height(xy.reshape(-1, 2)).reshape(nx, ny, 1)
@@ -83,7 +79,7 @@ def ground(x: tuple[float, float], y: tuple[float, float], step: float, height: 
 
 
 def column(radius: tuple[float, float], height: float, sides: int) -> Mesh:
-    """A standing prism or truncated cone (radius below and above), closed above."""
+    """Build a standing prism or truncated cone (radius below and above), closed above."""
     angles = np.linspace(0.0, 2 * np.pi, sides + 1)
     ring = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
     below = np.column_stack([radius[0] * ring, np.zeros(sides + 1)])
@@ -93,7 +89,7 @@ def column(radius: tuple[float, float], height: float, sides: int) -> Mesh:
 
 
 def ball(radius: ArrayLike, n: int, field: Field | None = None) -> Mesh:
-    """An ellipsoid of about 2 n² faces, its radius scaled by `1 + field(unit vectors)`."""
+    """Build an ellipsoid of about 2 n² faces, its radius scaled by `1 + field(unit vectors)`."""
     polar, azimuth = np.linspace(np.pi, 0.0, n + 1), np.linspace(0.0, 2 * np.pi, 2 * n + 1)
     p, a = np.meshgrid(polar, azimuth, indexing="ij")
     unit = np.stack([np.sin(p) * np.cos(a), np.sin(p) * np.sin(a), np.cos(p)], axis=-1)
@@ -103,7 +99,7 @@ def ball(radius: ArrayLike, n: int, field: Field | None = None) -> Mesh:
 
 
 def gable(low: ArrayLike, high: ArrayLike, rise: float, overhang: float) -> Mesh:
-    """A house: a box whose roof ridge runs along x, `rise` above the eaves."""
+    """Build a house: a box whose roof ridge runs along x, `rise` above the eaves."""
     low, high = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
     (x0, y0, z0), (x1, y1, z1) = low, high
     ym, zr = (y0 + y1) / 2, z1 + rise
@@ -133,13 +129,14 @@ _ONE_TRIANGLE = np.array([[0, 1, 2]], dtype=np.uint32)
 def smooth_noise(
     rng: np.random.Generator, wavelength: float, amplitude: float, dimensions: int = 2
 ) -> Field:
-    """A random smooth function of position with the given wavelength (m) and standard deviation."""
+    """Draw a random smooth function of position with the given wavelength (m) and standard deviation."""
     n_waves = 24
     waves = rng.normal(size=(n_waves, dimensions)) / wavelength * 2 * np.pi / np.sqrt(dimensions)
     phases = rng.uniform(0.0, 2 * np.pi, n_waves)
 
     def field(points: Array) -> Array:
         values: Array = np.cos(points @ waves.T + phases).sum(axis=1)
-        return values * amplitude * np.sqrt(2 / n_waves)
+        scaled: Array = values * (amplitude * np.sqrt(2 / n_waves))
+        return scaled
 
     return field

@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from bentwing.simulate.scenes.mesh import Mesh, box, merge, quad
@@ -26,7 +24,9 @@ def office(rng: np.random.Generator) -> Site:
         *_partitions(rng, length, width, height),
         *_furniture(rng, length, width, height),
     ]
-    return Site(merge(parts), (0.9, 0.9, 0.95), (length - 0.9, width - 0.9, 2.1), pad_below=0.1, speed=0.8)
+    return Site(
+        merge(parts), (0.9, 0.9, 0.95), (length - 0.9, width - 0.9, 2.1), pad_below=0.1, speed=0.8
+    )
 
 
 def _outer_walls(length: float, width: float, height: float) -> list[Mesh]:
@@ -39,9 +39,7 @@ def _outer_walls(length: float, width: float, height: float) -> list[Mesh]:
     ]
 
 
-def _partitions(
-    rng: np.random.Generator, length: float, width: float, height: float
-) -> list[Mesh]:
+def _partitions(rng: np.random.Generator, length: float, width: float, height: float) -> list[Mesh]:
     """Two cross walls with wide passages, and a meeting room with an open door in a corner."""
     parts = []
     for share in (0.34, 0.68):
@@ -66,12 +64,16 @@ def _furniture(rng: np.random.Generator, length: float, width: float, height: fl
         desk = [table(1.6, 0.8), box((-0.3, -0.05, 0.74), (0.3, 0.02, 1.1))]
         parts.append(merge(desk).moved(at, rng.uniform(-0.1, 0.1)))
     parts.append(table(1.8, 1.0).moved((length - 1.6, 1.4, 0.0)))
-    for x in (0.05, 0.4, 0.75):
-        parts.append(shelf(1.2, 1.9).moved((x * length + 0.4, width - 0.02, 0.0)))
+    parts += [
+        shelf(1.2, 1.9).moved((x * length + 0.4, width - 0.02, 0.0)) for x in (0.05, 0.4, 0.75)
+    ]
     for x, y in ((0.25, 0.3), (0.59, 0.7)):
-        at = (x * length, y * width + rng.uniform(-0.3, 0.3))
-        parts.append(box((at[0] - 0.2, at[1] - 0.2, 0), (at[0] + 0.2, at[1] + 0.2, height)))
-    for x in np.arange(1.5, length - 1.0, 2.4):
-        for y in (0.3 * width, 0.7 * width):
-            parts.append(box((x - 0.6, y - 0.15, height - 0.08), (x + 0.6, y + 0.15, height)))
+        pillar = box((-0.2, -0.2, 0), (0.2, 0.2, height))
+        parts.append(pillar.moved((x * length, y * width + rng.uniform(-0.3, 0.3), 0.0)))
+    lamp = box((-0.6, -0.15, height - 0.08), (0.6, 0.15, height))
+    parts += [
+        lamp.moved((x, y, 0.0))
+        for x in np.arange(1.5, length - 1.0, 2.4)
+        for y in (0.3 * width, 0.7 * width)
+    ]
     return parts

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,15 +18,15 @@ Opening = tuple[float, float, float, float]
 
 
 def facade(length: float, height: float, openings: Sequence[Opening], reveal: float) -> Mesh:
-    """A wall in the plane y = 0 over 0 ≤ x ≤ `length`, seen from −y.
+    """Build a wall in the plane y = 0 over 0 ≤ x ≤ `length`, seen from −y.
 
     Each opening is closed by a pane (or a door) `reveal` metres behind the wall's face.
     """
     xs = sorted({0.0, length, *(v for o in openings for v in o[:2])})
     zs = sorted({0.0, height, *(v for o in openings for v in o[2:])})
     parts = [_reveal(opening, reveal) for opening in openings]
-    for x0, x1 in zip(xs[:-1], xs[1:], strict=True):
-        for z0, z1 in zip(zs[:-1], zs[1:], strict=True):
+    for x0, x1 in pairwise(xs):
+        for z0, z1 in pairwise(zs):
             centre = ((x0 + x1) / 2, (z0 + z1) / 2)
             if not any(_inside(centre, opening) for opening in openings):
                 parts.append(quad([(x0, 0, z0), (x1, 0, z0), (x1, 0, z1), (x0, 0, z1)]))
@@ -59,14 +60,14 @@ def windows(length: float, sills: Sequence[float], spacing: float) -> list[Openi
 
 
 def tree(rng: np.random.Generator, height: float) -> Mesh:
-    """A trunk and a bumpy crown, standing on the origin."""
+    """Build a trunk and a bumpy crown, standing on the origin."""
     trunk = column((0.09 * height**0.5, 0.05 * height**0.5), 0.6 * height, 9)
     crown = ball([0.24 * height, 0.24 * height, 0.3 * height], 9, smooth_noise(rng, 0.8, 0.12, 3))
     return merge([trunk, crown.moved((0.0, 0.0, 0.7 * height))])
 
 
 def car() -> Mesh:
-    """A car-like pair of boxes on wheels of 0.2 m, standing on the origin, front along x."""
+    """Build a car-like pair of boxes on wheels of 0.2 m, standing on the origin, front along x."""
     body = box((-2.1, -0.85, 0.2), (2.1, 0.85, 0.85))
     cabin = box((-1.3, -0.75, 0.85), (0.9, 0.75, 1.45))
     wheels = [
@@ -78,7 +79,7 @@ def car() -> Mesh:
 
 
 def table(length: float, width: float) -> Mesh:
-    """A table 0.74 m high, centred on the origin."""
+    """Build a table 0.74 m high, centred on the origin."""
     x, y = length / 2, width / 2
     legs = [
         box((i * (x - 0.06) - 0.03, j * (y - 0.06) - 0.03, 0.0),
@@ -90,7 +91,7 @@ def table(length: float, width: float) -> Mesh:
 
 
 def shelf(length: float, height: float) -> Mesh:
-    """An open shelf 0.35 m deep with its back at y = 0, from x = 0, seen from −y."""
+    """Build an open shelf 0.35 m deep with its back at y = 0, from x = 0, seen from −y."""
     boards = [box((0, -0.35, z), (length, 0, z + 0.03)) for z in np.arange(0.05, height, 0.42)]
     sides = [box((x, -0.35, 0), (x + 0.03, 0, height)) for x in (0.0, length - 0.03)]
     return merge([*boards, *sides, box((0, -0.02, 0), (length, 0, height))])

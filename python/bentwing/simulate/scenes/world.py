@@ -51,7 +51,7 @@ class World:
 
 
 def face_normals(mesh: Mesh) -> NDArray[np.float64]:
-    """Unit normals (T, 3); zero for triangles without area."""
+    """Return unit normals (T, 3); zero for triangles without area."""
     a, b, c = (mesh.vertices[mesh.triangles[:, i]] for i in range(3))
     normals = np.cross(b - a, c - a)
     length = np.linalg.norm(normals, axis=1, keepdims=True)

@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""Holds what was fed until a step of the estimator can use it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bentwing.recording.batches import EncoderBatch, ImuBatch, LidarBatch
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from bentwing.recording.batches import Batch
+
+
+@dataclass(frozen=True, slots=True)
+class LidarStretch:
+    """Lidar points of a stretch of time; fields as in `LidarBatch`."""
+
+    points: NDArray[np.float64]
+    times: NDArray[np.float64]
+    angles: NDArray[np.float64] | None
+
+
+class BatchBuffer:
+    """Lidar and IMU batches in time order, cut by time."""
+
+    def __init__(self) -> None:
+        self._lidar: list[LidarBatch] = []
+        self._imu: list[ImuBatch] = []
+
+    def add(self, batch: Batch) -> None:
+        """Take the next batch; encoder batches have done their work in preprocess."""
+        if isinstance(batch, EncoderBatch) or len(batch.times) == 0:
+            return
+        if isinstance(batch, LidarBatch):
+            self._lidar.append(batch)
+        else:
+            self._imu.append(batch)
+
+    @property
+    def has_imu(self) -> bool:
+        """Whether any inertial sample is held."""
+        return bool(self._imu)
+
+    @property
+    def lidar_span(self) -> tuple[float, float] | None:
+        """First and last lidar stamp, s."""
+        if not self._lidar:
+            return None
+        return float(self._lidar[0].times[0]), float(self._lidar[-1].times[-1])
+
+    @property
+    def imu_span(self) -> tuple[float, float] | None:
+        """First and last inertial stamp, s."""
+        if not self._imu:
+            return None
+        return float(self._imu[0].times[0]), float(self._imu[-1].times[-1])
+
+    def lidar(self, start: float, stop: float) -> LidarStretch:
+        """Return the points with stamps in `[start, stop)`."""
+        parts = [b for b in self._lidar if b.times[0] < stop and b.times[-1] >= start]
+        if not parts:
+            return LidarStretch(np.empty((0, 3)), np.empty(0), None)
+        times = np.concatenate([b.times for b in parts])
+        keep = slice(*np.searchsorted(times, [start, stop]))
+        points = np.concatenate([b.points for b in parts])[keep]
+        angles = [b.angles for b in parts if b.angles is not None]
+        joined = np.concatenate(angles)[keep] if len(angles) == len(parts) else None
+        return LidarStretch(np.ascontiguousarray(points), times[keep], joined)
+
+    def imu(self, start: float, stop: float) -> ImuBatch:
+        """Return the inertial samples with stamps in `[start, stop)`."""
+        parts = [b for b in self._imu if b.times[0] < stop and b.times[-1] >= start]
+        if not parts:
+            return ImuBatch(np.empty(0), np.empty((0, 3)), np.empty((0, 3)))
+        times = np.concatenate([b.times for b in parts])
+        keep = slice(*np.searchsorted(times, [start, stop]))
+        gyro = np.concatenate([b.gyro for b in parts])[keep]
+        accel = np.concatenate([b.accel for b in parts])[keep]
+        return ImuBatch(times[keep], np.ascontiguousarray(gyro), np.ascontiguousarray(accel))
+
+    def forget(self, before: float) -> None:
+        """Drop batches that end before a time, s."""
+        self._lidar = [b for b in self._lidar if b.times[-1] >= before]
+        self._imu = [b for b in self._imu if b.times[-1] >= before]

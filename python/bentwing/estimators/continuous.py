@@ -1,0 +1,231 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""The continuous-time estimator: a sliding window of surfel registration (Kaul 2015, section 2)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bentwing import _core, geometry
+from bentwing.errors import NotEnoughDataError
+from bentwing.estimators.buffer import BatchBuffer
+from bentwing.estimators.core_settings import CoreSettings
+from bentwing.estimators.interface import Calibration, Estimate
+from bentwing.estimators.odometry_pass import DT, MARGIN, OdometryPass
+from bentwing.estimators.settings import ContinuousSettings
+from bentwing.estimators.slow_states import SlowStatePrior, named_std
+from bentwing.estimators.start import STANDARD_GRAVITY, Start, attitude_of, find_start, level_start
+from bentwing.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from bentwing.recording import Batch, Payload
+
+# A rest shorter than this is waited out before the start is judged, s.
+LOOK_AHEAD = 6.0
+# The windows begin this long before the end of the rest, s.
+REST_KEPT = 1.0
+
+
+class Continuous:
+    """Continuous-time surfel odometry; feed batches in time order, then ask for the result.
+
+    The first seconds are run twice: once to learn the calibration, then again with it, since
+    latency, extrinsics and accelerometer bias cannot be known before the payload has turned.
+    """
+
+    def __init__(
+        self, payload: Payload, settings: ContinuousSettings | None = None, threads: int | None = None
+    ) -> None:
+        self.settings = settings or ContinuousSettings()
+        self._payload = payload
+        self._threads = threads or 0
+        self._core = CoreSettings.of(self.settings.registration, payload, DT)
+        self._buffer = BatchBuffer()
+        self._start: Start | None = None
+        self._first = 0.0
+        self._pass: OdometryPass | None = None
+        self._rehearsing = self.settings.rehearsal > 0
+
+    def feed(self, batch: Batch) -> None:
+        """Take the next batch; windows that have become complete are registered."""
+        self._buffer.add(batch)
+        self._advance(finishing=False)
+
+    def result(self) -> Estimate:
+        """Finish with what was fed so far.
+
+        Raises
+        ------
+        NotEnoughDataError
+            There is no second of lidar data.
+        """
+        self._advance(finishing=True)
+        if self._pass is None or not self._pass.windows:
+            msg = f"less than {self.settings.shift:g} s of lidar points; nothing can be estimated"
+            raise NotEnoughDataError(msg)
+        return self._estimate(self._pass)
+
+    def _advance(self, *, finishing: bool) -> None:
+        ready = self._ready_until(finishing=finishing)
+        if ready is None:
+            return
+        if self._start is None and not self._begin(ready, finishing=finishing):
+            return
+        while self._step(ready, finishing=finishing):
+            pass
+
+    def _ready_until(self, *, finishing: bool) -> float | None:
+        """Return the time up to which lidar and IMU data are complete, s."""
+        lidar, imu = self._buffer.lidar_span, self._buffer.imu_span
+        if lidar is None:
+            return None
+        if imu is None:
+            return lidar[1]
+        return lidar[1] if finishing else min(lidar[1], imu[1] - 2 * MARGIN)
+
+    def _begin(self, ready: float, *, finishing: bool) -> bool:
+        """Find the start once enough has been seen; returns whether it was."""
+        lidar, imu = self._buffer.lidar_span, self._buffer.imu_span
+        if lidar is None or (ready - lidar[0] < LOOK_AHEAD and not finishing):
+            return False
+        self._first = lidar[0]
+        if imu is None or self._payload.imu is None:
+            self._start = level_start(lidar[0])
+        else:
+            # The trajectory begins with the later of both sensors.
+            self._first = max(lidar[0], imu[0] + 2 * DT)
+            begin = self._buffer.imu(imu[0], imu[1] + 1.0)
+            start = find_start(begin, self._payload.imu)
+            still_resting = start.static is not None and start.hold >= imu[1] - 1.0
+            if still_resting and not finishing:
+                return False
+            self._start = start
+        self._pass = self._new_pass(self._start, None)
+        return True
+
+    def _new_pass(self, start: Start, learned: OdometryPass | None) -> OdometryPass:
+        hold = max(self._first, start.hold - REST_KEPT) if start.static is not None else self._first
+        n = max(2, round((hold - self._first) / DT) + 1)
+        slow = self._initial_globals(start) if learned is None else self._learned_globals(learned)
+        quat = start.quat_xyzw
+        if learned is not None and start.static is not None:
+            quat = attitude_of(start.static.accel_mean - slow.accel_bias)
+        samples = _core.Samples(
+            self._first, DT, np.zeros((n, 3)), np.repeat(quat[None], n, axis=0)
+        )
+        has_imu = self._buffer.has_imu and self._payload.imu is not None
+        if learned is None:
+            prior = SlowStatePrior(
+                self._payload.imu if has_imu else None,
+                has_motor=self._payload.encoder is not None,
+                moving=start.static is None,
+                frozen=self.settings.frozen,
+            )
+            if start.static is not None:
+                prior.tighten("gyro_bias", start.static.gyro_bias_std)
+        else:
+            prior = learned.prior
+        return OdometryPass(
+            samples,
+            slow,
+            prior,
+            self.settings,
+            self._core,
+            self._threads,
+            clamped=start.static is not None,
+        )
+
+    def _initial_globals(self, start: Start) -> _core.Globals:
+        encoder, gravity = self._payload.encoder, (0.0, 0.0, STANDARD_GRAVITY)
+        biases = {"gyro_bias": tuple(start.gyro_bias), "accel_bias": tuple(start.accel_bias)}
+        if encoder is None:
+            T = self._payload.T_imu_lidar
+            base = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)) if T is None else (T.translation, T.quaternion)
+            return _core.Globals(base, latency=0.0, gravity=gravity, **biases)
+        return _core.Globals(
+            (encoder.T_imu_motor.translation, encoder.T_imu_motor.quaternion),
+            latency=0.0,
+            gravity=gravity,
+            motor_axis=encoder.axis,
+            T_motor_lidar=(encoder.T_motor_lidar.translation, encoder.T_motor_lidar.quaternion),
+            **biases,
+        )
+
+    def _learned_globals(self, learned: OdometryPass) -> _core.Globals:
+        """Keep what was learned; the map is levelled anew."""
+        return learned.globals.levelled()
+
+    def _step(self, ready: float, *, finishing: bool) -> bool:
+        """Register the next window if its data is complete; returns whether it was."""
+        current, start = self._pass, self._start
+        if current is None or start is None:
+            return False
+        rehearsed = current.end - start.hold >= self.settings.rehearsal
+        if self._rehearsing and (rehearsed or (finishing and ready - current.end < DT)):
+            self._rehearsing = False
+            self._pass = current = self._new_pass(start, current)
+        end = current.end + self.settings.shift
+        if end > ready:
+            if not finishing or ready - current.end < DT:
+                return False
+            end = ready
+        current.step(self._buffer, end)
+        if not self._rehearsing:
+            self._buffer.forget(end - self.settings.window - 1.0)
+        return True
+
+    def _estimate(self, last: OdometryPass) -> Estimate:
+        times, positions, quats = last.trajectory()
+        level = _levelling(last.globals.gravity)
+        trajectory = Trajectory(
+            times,
+            geometry.rotate(level, positions),
+            geometry.multiply(np.broadcast_to(level, quats.shape), quats),
+        )
+        slow = last.globals
+        calibration = Calibration(
+            latency=slow.latency,
+            T_imu_lidar_translation=slow.base_translation,
+            T_imu_lidar_quat_xyzw=slow.base_quat_xyzw,
+            gyro_bias=slow.gyro_bias,
+            accel_bias=slow.accel_bias,
+            gravity=np.array([0.0, 0.0, STANDARD_GRAVITY]),
+            encoder_zero=slow.encoder_zero,
+            std=named_std(last.covariance, last.prior.frozen),
+        )
+        return Estimate(
+            trajectory,
+            calibration,
+            windows=last.windows,
+            counts={"estimate.windows": len(last.windows), "estimate.samples_without_imu": last.n_blind},
+            timings=last.timings,
+            warnings=_warnings(last),
+        )
+
+
+def _levelling(gravity: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Quaternion (4,) that turns the direction of `gravity` (3,) to +z the shortest way."""
+    up = gravity / np.linalg.norm(gravity)
+    axis = np.cross(up, [0.0, 0.0, 1.0])
+    sine = float(np.linalg.norm(axis))
+    if sine < 1e-12:
+        return np.array([0.0, 0.0, 0.0, 1.0])
+    return geometry.exp((axis / sine * np.arctan2(sine, up[2]))[None])[0]
+
+
+def _warnings(last: OdometryPass) -> list[str]:
+    sentences = []
+    degenerate = [w["time"] for w in last.windows if w["degenerate"]]
+    if degenerate:
+        sentences.append(
+            f"{len(degenerate)} of {len(last.windows)} windows see too little in some direction "
+            f"(first at {degenerate[0]:.1f} s): the IMU carries the estimate there"
+        )
+    if last.n_blind:
+        sentences.append(
+            f"{last.n_blind * DT:.2f} s have no inertial data: the motion went on at constant velocity there"
+        )
+    return sentences

@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""One pass of the sliding window over a recording (Kaul 2015, section 2.1 and 4)."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bentwing import _core
+from bentwing.estimators.slow_states import SlowStatePrior, named_std
+from bentwing.estimators.views import FixedViews
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from bentwing.estimators.buffer import BatchBuffer, LidarStretch
+    from bentwing.estimators.core_settings import CoreSettings
+    from bentwing.estimators.settings import ContinuousSettings
+
+DT = 0.01  # s, interval of the trajectory's samples
+# The trajectory reaches this much beyond the newest stamp, for latencies of either sign, s.
+MARGIN = 0.05
+# Without this much spread of the normals a direction is not seen by the matches alone.
+MIN_EIGENVALUE = 0.02
+
+
+class OdometryPass:
+    """Runs windows over the data as it comes; holds only what the next window needs.
+
+    Attributes
+    ----------
+    samples : dense trajectory from a few seconds before the window to its end
+    globals : current slow states
+    """
+
+    def __init__(
+        self,
+        samples: _core.Samples,
+        slow: _core.Globals,
+        prior: SlowStatePrior,
+        settings: ContinuousSettings,
+        core: CoreSettings,
+        threads: int,
+        *,
+        clamped: bool,
+    ) -> None:
+        self.samples = samples
+        self.globals = slow
+        self.prior = prior
+        self.windows: list[dict[str, Any]] = []
+        self.n_blind = 0
+        self._settings = settings
+        self._core = core
+        self._threads = threads
+        self._clamped = clamped
+        self._origin = samples.start
+        self._surfels: list[tuple[float, _core.Surfels]] = []
+        self._views = FixedViews(settings)
+        self._finished: list[tuple[NDArray[np.float64], NDArray[np.float64]]] = []
+        self._n_finished = 0
+        self._end = samples.end
+        self.covariance = np.zeros((20, 20))
+        self.timings = {"propagate": 0.0, "surfels": 0.0, "register": 0.0}
+
+    @property
+    def end(self) -> float:
+        """Stamp up to which lidar data was used, s."""
+        return self._end
+
+    def step(self, buffer: BatchBuffer, end: float) -> None:
+        """Take the lidar data up to `end`, s, and register the window that ends there."""
+        watch = time.perf_counter()
+        imu = self._imu(buffer, end)
+        extended, n_blind = self.samples.extended(imu, self.globals, end + MARGIN)
+        self.samples = extended
+        self.n_blind += n_blind
+        watch = self._lap("propagate", watch)
+        stretch = buffer.lidar(self._end, end)
+        self._surfels.append((self._end, self._extract(stretch)))
+        self._end = end
+        watch = self._lap("surfels", watch)
+        self._register(imu)
+        self._lap("register", watch)
+        self._retire()
+
+    def trajectory(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Return times (N,), positions (N, 3) and quaternions (N, 4) of all samples so far."""
+        parts = [*self._finished, (self.samples.positions, self.samples.quats_xyzw)]
+        positions = np.concatenate([p for p, _ in parts])
+        times = self._origin + DT * np.arange(len(positions))
+        return times, positions, np.concatenate([q for _, q in parts])
+
+    def _imu(self, buffer: BatchBuffer, end: float) -> _core.Imu | None:
+        if not buffer.has_imu:
+            return None
+        batch = buffer.imu(self._window_start(end) - 0.2, end + MARGIN + 0.2)
+        return _core.Imu(batch.times, batch.gyro, batch.accel)
+
+    def _extract(self, stretch: LidarStretch) -> _core.Surfels:
+        return _core.extract_surfels(
+            stretch.points,
+            stretch.times,
+            stretch.angles,
+            self.samples,
+            self.globals,
+            settings=self._settings.surfels,
+            threads=self._threads,
+        )
+
+    def _window_start(self, end: float) -> float:
+        return max(self._origin, end - self._settings.window)
+
+    def _register(self, imu: _core.Imu | None) -> None:
+        start = self._window_start(self._end)
+        first = max(0, round((start - self.samples.start) / DT))
+        window = self.samples.slice(first, len(self.samples) - 1)
+        clamped = self._clamped or start > self._origin
+        result = _core.register_window(
+            window,
+            [s for t, s in self._surfels if t >= start - 1e-6],
+            self._views.views,
+            imu,
+            self.globals,
+            information=self.prior.information,
+            frozen=self.prior.frozen.tolist(),
+            clamped=clamped,
+            settings=self._core,
+            threads=self._threads,
+        )
+        self.samples = self.samples.replaced(first, result.samples)
+        self.globals = result.globals
+        self.covariance = result.covariance
+        length = self._end - start
+        self.prior.carry(result.covariance, min(self._settings.shift, length), length)
+        self.windows.append(self._record(result))
+
+    def _record(self, result: _core.Registration) -> dict[str, Any]:
+        translation = list(result.translation_eigenvalues)
+        rotation = list(result.rotation_eigenvalues)
+        n_matches = result.n_matches + result.n_fixed_matches
+        degenerate = n_matches == 0 or min(translation[0], rotation[0]) < MIN_EIGENVALUE
+        return {
+            "time": self._end,
+            "n_surfels": result.n_surfels,
+            "n_matches": result.n_matches,
+            "n_fixed_matches": result.n_fixed_matches,
+            "inlier_share": result.inlier_share,
+            "residual_rms": result.residual_rms,
+            "iterations": result.n_outer,
+            "converged": result.converged,
+            "degenerate": degenerate,
+            "weakest_direction": list(result.weakest_direction) if degenerate else None,
+            "translation_eigenvalues": translation,
+            "rotation_eigenvalues": rotation,
+            "n_blind": result.n_blind,
+            "latency": self.globals.latency,
+            "gyro_bias": self.globals.gyro_bias.tolist(),
+            "accel_bias": self.globals.accel_bias.tolist(),
+            "gravity": self.globals.gravity.tolist(),
+            "extrinsic_translation": self.globals.base_translation.tolist(),
+            "extrinsic_quat_xyzw": self.globals.base_quat_xyzw.tolist(),
+            "std": named_std(result.covariance, self.prior.frozen),
+        }
+
+    def _retire(self) -> None:
+        """Freeze what has left the window, and forget what no view can need any more."""
+        next_start = self._window_start(self._end + self._settings.shift)
+        self._views.update(self._surfels, next_start, self.samples, self.globals)
+        oldest = next_start - self._settings.view_length - self._settings.shift
+        self._surfels = [(t, s) for t, s in self._surfels if t >= oldest]
+        n = round((oldest - self.samples.start) / DT)
+        if n > 1000:
+            positions, quats = self.samples.positions, self.samples.quats_xyzw
+            self._finished.append((positions[:n], quats[:n]))
+            self.samples = self.samples.slice(n, len(self.samples) - 1)
+
+    def _lap(self, name: str, since: float) -> float:
+        now = time.perf_counter()
+        self.timings[name] += now - since
+        return now

@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""Where a trajectory begins: at rest, in motion, or without an IMU."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bentwing import geometry
+from bentwing.preprocess import find_static_start
+from bentwing.preprocess.static_init import level_attitude
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from bentwing.preprocess import StaticStart
+    from bentwing.recording import ImuBatch
+    from bentwing.recording.payload import Imu
+
+STANDARD_GRAVITY = 9.80665
+# A start in motion takes its first attitude from the mean force over this time, s: long enough
+# for the accelerations of a flight to average out.
+MOVING_MEAN = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Start:
+    """First pose and biases.
+
+    Attributes
+    ----------
+    static : what the rest at the start has told, or None
+    quat_xyzw : (4,) attitude of the first pose, yaw zero
+    gyro_bias, accel_bias : (3,) rad/s, m/s²
+    hold : s, the pose stays the first one until this time
+    """
+
+    static: StaticStart | None
+    quat_xyzw: NDArray[np.float64]
+    gyro_bias: NDArray[np.float64]
+    accel_bias: NDArray[np.float64]
+    hold: float
+
+
+def level_start(time: float) -> Start:
+    """Return the start of a recording without IMU: the first pose is the map."""
+    return Start(None, np.array([0.0, 0.0, 0.0, 1.0]), np.zeros(3), np.zeros(3), time)
+
+
+def find_start(imu: ImuBatch, noise: Imu) -> Start:
+    """Return the start of a recording with an IMU, from its first seconds."""
+    static = find_static_start(
+        imu.times,
+        imu.gyro,
+        imu.accel,
+        gyro_bias_walk=noise.gyro_bias_walk,
+        accel_bias_walk=noise.accel_bias_walk,
+    )
+    if static is None:
+        first = imu.times < imu.times[0] + MOVING_MEAN
+        up = imu.accel[first].mean(axis=0)
+        return Start(None, attitude_of(up), np.zeros(3), np.zeros(3), float(imu.times[0]))
+    # Only the part of the bias along gravity shows at rest; the rest is in the attitude.
+    force = static.accel_mean
+    bias = force * (1.0 - STANDARD_GRAVITY / float(np.linalg.norm(force)))
+    return Start(static, attitude_of(force), static.gyro_bias, bias, static.end)
+
+
+def attitude_of(force: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Quaternion (4,) of the attitude, yaw zero, in which `force` (3,) in the IMU frame is up."""
+    return geometry.from_matrices(level_attitude(force)[None])[0]

@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+import numpy as np
+import pytest
+
+from bentwing._core import Scene
+from bentwing.simulate.planner import plan_tour
+from bentwing.simulate.scenes import SCENES, World
+from bentwing.simulate.scenes.mesh import ball, box, column, gable
+from bentwing.simulate.scenes.parts import car, facade, table
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_every_scene_has_a_tour_clear_of_its_surfaces(name):
+    rng = np.random.default_rng(5)
+    world = World(SCENES[name](rng))
+    tour = plan_tour(world, rng, 40.0, 1.0)
+    length = np.linalg.norm(np.diff(tour.way_points, axis=0), axis=1).sum()
+    assert 20.0 < length < 120.0
+    assert world.clearance(tour.way_points).min() > 1.0
+    np.testing.assert_array_equal(tour.way_points[0], tour.way_points[-1])
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_surfaces_face_whoever_flies_along(name):
+    rng = np.random.default_rng(6)
+    world = World(SCENES[name](rng))
+    start = plan_tour(world, rng, 20.0, 1.0).way_points[0]
+    rays = rng.normal(size=(4000, 3))
+    rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+    ranges, faces = world.scene.cast(np.tile(start, (4000, 1)), rays, 100.0)
+    hit = np.isfinite(ranges)
+    facing = np.einsum("ni,ni->n", world.normals[faces], rays)[hit] < 0
+    # Leaves have no outside.
+    assert facing.mean() > (0.8 if name == "forest" else 0.995)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_seeds_change_the_geometry(name):
+    one, other = (SCENES[name](np.random.default_rng(seed)).mesh for seed in (1, 2))
+    assert one.vertices.shape != other.vertices.shape or (one.vertices != other.vertices).any()
+
+
+@pytest.mark.parametrize(
+    "body",
+    [box((0, 0, 0), (1, 2, 3)), ball(1.0, 8), column((0.5, 0.3), 2.0, 8), car(), table(1.6, 0.8)],
+    ids=["box", "ball", "column", "car", "table"],
+)
+def test_bodies_are_seen_from_outside(body):
+    scene = Scene(np.ascontiguousarray(body.vertices), body.triangles)
+    around = 10.0 * np.random.default_rng(0).normal(size=(200, 3)) + [0.0, 0.0, 40.0]
+    assert (scene.distance(around)[0] > 0).all()
+
+
+def test_a_house_has_its_ridge_above_the_eaves():
+    house = gable((0, 0, 0), (8, 6, 3), 2.0, 0.3)
+    assert house.vertices[:, 2].max() == 5.0
+
+
+def test_a_window_is_set_back_by_its_reveal():
+    wall = facade(4.0, 3.0, [(1.0, 2.0, 1.0, 2.0)], 0.2)
+    scene = Scene(wall.vertices, wall.triangles)
+    origins = np.array([[0.5, -1.0, 0.5], [1.5, -1.0, 1.5]])
+    ranges, _ = scene.cast(origins, np.tile([0.0, 1.0, 0.0], (2, 1)), 10.0)
+    np.testing.assert_allclose(ranges, [1.0, 1.2])

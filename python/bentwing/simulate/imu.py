@@ -21,6 +21,12 @@ GRAVITY = np.array([0.0, 0.0, 9.80665])
 RATE_HZ = 200.0
 NODE_RATE_HZ = 100.0
 """The rate at which estimators combine samples, for the density that includes the vibration."""
+HARMONICS = ((1, 1.0), (2, 0.03), (3, 0.01))
+"""Order and share of the rotor tone's harmonics behind the sensor's low-pass filter."""
+BROADBAND = 0.2
+"""Share of the vibration that changes from sample to sample."""
+AXIS_GAINS = (0.5, 1.0)
+"""Between these, each axis feels its own share of the vibration."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,18 +53,20 @@ class ImuErrors:
     rotor_hz: float = 90.0
 
     def densities(self) -> tuple[float, float]:
-        """Gyro and accelerometer densities with what is left of the vibration after averaging.
+        """Return gyro and accelerometer densities with what averaging leaves of the vibration.
 
-        The rotor tone is damped by the averaging over two samples to cos²(π f T); harmonics and
-        the tone's wandering alias to low frequencies and add about 2 % of its amplitude.
+        Averaging two samples into a node damps a tone of frequency f by cos²(π f T), aliased
+        harmonics included; the broadband part of the vibration counts as white noise.
         """
-        left = np.cos(np.pi * self.rotor_hz / RATE_HZ) ** 2 / np.sqrt(2) + 0.02
-        white = (self.gyro_noise, self.accel_noise)
-        tones = (self.gyro_vibration, self.accel_vibration)
-        both = [
-            np.hypot(w, left * a / np.sqrt(NODE_RATE_HZ)) for w, a in zip(white, tones, strict=True)
-        ]
-        return float(both[0]), float(both[1])
+        orders, shares = np.array(HARMONICS).T
+        passed = shares * np.cos(np.pi * orders * self.rotor_hz / RATE_HZ) ** 2
+        tonal = np.linalg.norm(passed) / np.sqrt(NODE_RATE_HZ)
+        left = float(np.hypot(tonal, BROADBAND * np.linalg.norm(shares) / np.sqrt(RATE_HZ)))
+        # Amplitude to standard deviation, with the mean square of the axes' gains.
+        left *= np.sqrt(np.mean(np.linspace(*AXIS_GAINS, 100) ** 2) / 2)
+        gyro = np.hypot(self.gyro_noise, left * self.gyro_vibration)
+        accel = np.hypot(self.accel_noise, left * self.accel_vibration)
+        return float(gyro), float(accel)
 
 
 PERFECT = ImuErrors(*[0.0] * 8)
@@ -85,7 +93,10 @@ class Imu:
         sizes = np.repeat([self.errors.gyro_bias, self.errors.accel_bias], 3)
         self.biases = self.rng.uniform(-1.0, 1.0, 6) * sizes
         self._phase = self.rng.uniform(0.0, 2 * np.pi)
-        self._directions = self.rng.uniform(0.5, 1.0, 6), self.rng.uniform(0.0, 2 * np.pi, (3, 6))
+        self._directions = (
+            self.rng.uniform(*AXIS_GAINS, 6),
+            self.rng.uniform(0.0, 2 * np.pi, (3, 6)),
+        )
 
     def sample(self, times: Array, motion: Motion) -> tuple[Array, Array]:
         """Gyro and accelerometer (M, 3) at `times`, given the IMU frame's true motion."""
@@ -111,12 +122,9 @@ class Imu:
         frequency = e.rotor_hz * (1.0 + 0.01 * np.sin(0.7 * times) + 0.004 * np.sin(2.9 * times))
         phase = self._phase + 2 * np.pi * np.cumsum(frequency) / RATE_HZ
         self._phase = float(phase[-1] % (2 * np.pi))
-        tones = sum(
-            share * np.sin(k * phase[:, None] + offsets[k - 1])
-            for k, share in ((1, 1.0), (2, 0.03), (3, 0.01))
-        )
+        tones = sum(share * np.sin(k * phase[:, None] + offsets[k - 1]) for k, share in HARMONICS)
         size = np.repeat([e.gyro_vibration, e.accel_vibration], 3) * gains
-        strength = self.activity(times) * (1.0 + 0.2 * self.rng.normal(size=len(times)))
+        strength = self.activity(times) * (1.0 + BROADBAND * self.rng.normal(size=len(times)))
         return np.asarray(tones * size * strength[:, None])
 
 

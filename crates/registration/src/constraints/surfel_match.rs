@@ -83,25 +83,30 @@ pub fn add_globals(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::constraints::testing::{Scene, assert_jacobian};
+    use crate::constraints::testing::{Scene, assert_row};
     use crate::placed::place;
     use crate::rows::RowGroup;
     use proptest::prelude::*;
 
     proptest! {
+        /// The model is eq. 3: the correction at the surfel's own time turns its lever and moves it.
         #[test]
         fn the_jacobian_agrees_with_central_differences(scene in Scene::any(), i in 0..8_usize) {
             let set = scene.surfels();
-            let at = |trajectory: &_, globals: &_| place(&set, i, trajectory, globals);
             let spline = scene.spline();
-            let mut surfel = at(&scene.trajectory, &scene.globals);
+            let mut surfel = place(&set, i, &scene.trajectory, &scene.globals);
             surfel.basis = spline.basis(surfel.time);
             let n = Vector3::new(0.48, -0.6, 0.64);
             let first = surfel.basis.first;
             let mut group = RowGroup::new((first..first + 4).collect());
             write_knots(group.knots_mut(), &surfel, &n, 1.0);
             add_globals(group.globals_mut(), &scene.globals.head, &surfel, &n, 1.0);
-            assert_jacobian(&scene, &group, |t, g| n.dot(&at(t, g).mean))?;
+            assert_row(&scene, &group, |controls, globals| {
+                let moved = place(&set, i, &scene.trajectory, globals);
+                let d = spline.evaluate(controls, surfel.time);
+                let turn = so3::exp(&Vector3::new(d[0], d[1], d[2]));
+                n.dot(&(moved.mean - moved.lever + turn * moved.lever + Vector3::new(d[3], d[4], d[5])))
+            })?;
         }
     }
 }

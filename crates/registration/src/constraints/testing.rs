@@ -111,65 +111,65 @@ impl Scene {
         }
     }
 
-    /// The scene moved by a correction of one control point or global state.
-    fn moved(&self, unknown: usize, step: f64) -> Self {
-        let mut scene = self.clone();
-        let spline = self.spline();
-        if let Some(global) = unknown.checked_sub(6 * spline.n_controls()) {
+    /// A correction of one control point or global state.
+    fn step(&self, unknown: usize, size: f64) -> (Vec<[f64; 6]>, Globals) {
+        let mut controls = vec![[0.0; 6]; self.spline().n_controls()];
+        let mut globals = self.globals.clone();
+        if let Some(global) = unknown.checked_sub(6 * controls.len()) {
             let mut delta = [0.0; N_GLOBALS];
-            delta[global] = step;
-            scene.globals.correct(&delta);
+            delta[global] = size;
+            globals.correct(&delta);
         } else {
-            let mut controls = vec![[0.0; 6]; spline.n_controls()];
-            controls[unknown / 6][unknown % 6] = step;
-            let correction = |n| {
-                let d = spline.evaluate(&controls, self.trajectory.time(n));
-                [
-                    Vector3::new(d[0], d[1], d[2]),
-                    Vector3::new(d[3], d[4], d[5]),
-                ]
-            };
-            let corrections: Vec<_> = (0..self.trajectory.len()).map(correction).collect();
-            scene.trajectory.correct(&corrections);
+            controls[unknown / 6][unknown % 6] = size;
         }
-        scene
+        (controls, globals)
     }
 
-    fn n_unknowns(&self) -> usize {
-        6 * self.spline().n_controls() + N_GLOBALS
+    /// The trajectory with a correction composed into its samples.
+    fn corrected(&self, controls: &[[f64; 6]]) -> Trajectory {
+        let spline = self.spline();
+        let mut trajectory = self.trajectory.clone();
+        let correction = |n| {
+            let d = spline.evaluate(controls, self.trajectory.time(n));
+            [Vector3::new(d[0], d[1], d[2]), Vector3::new(d[3], d[4], d[5])]
+        };
+        let corrections: Vec<_> = (0..trajectory.len()).map(correction).collect();
+        trajectory.correct(&corrections);
+        trajectory
     }
 
-    /// Central differences of `residuals`, one vector per unknown; fourth order, so that a step
-    /// large enough against rounding has no error of its own.
-    fn derivatives(&self, residuals: &impl Fn(&Trajectory, &Globals) -> Vec<f64>) -> Vec<Vec<f64>> {
-        let at = |u: usize, step: f64| {
-            let scene = self.moved(u, step);
-            residuals(&scene.trajectory, &scene.globals)
+    /// Central differences of `residuals` by every unknown; fourth order, so that a step large
+    /// enough against rounding has no error of its own.
+    fn derivatives(
+        &self,
+        residuals: impl Fn(&[[f64; 6]], &Globals) -> Vec<f64>,
+    ) -> Vec<Vec<f64>> {
+        let at = |unknown: usize, size: f64| {
+            let (controls, globals) = self.step(unknown, size);
+            residuals(&controls, &globals)
         };
         let h = 1e-3;
         let derivative = |u: usize| {
             let [a, b, c, d] = [at(u, -2.0 * h), at(u, -h), at(u, h), at(u, 2.0 * h)];
-            (0..a.len())
-                .map(|i| (a[i] - 8.0 * b[i] + 8.0 * c[i] - d[i]) / (12.0 * h))
-                .collect()
+            (0..a.len()).map(|i| (a[i] - 8.0 * b[i] + 8.0 * c[i] - d[i]) / (12.0 * h)).collect()
         };
-        (0..self.n_unknowns()).map(derivative).collect()
+        (0..6 * self.spline().n_controls() + N_GLOBALS).map(derivative).collect()
     }
 }
 
 /// Checks the single row held by `group` against central differences of `residual`.
-pub fn assert_jacobian(
+pub fn assert_row(
     scene: &Scene,
     group: &RowGroup,
-    residual: impl Fn(&Trajectory, &Globals) -> f64,
+    residual: impl Fn(&[[f64; 6]], &Globals) -> f64,
 ) -> Result<(), TestCaseError> {
     let mut group = group.clone();
     group.add(1.0, 1.0);
     let mut equations = NormalEquations::new(scene.spline().n_controls());
     group.flush(&mut equations);
-    let analytic = gradient_of(&equations);
-    let numeric = scene.derivatives(&|t, g| vec![residual(t, g)]);
-    compare(&analytic, &numeric.iter().map(|d| d[0]).collect::<Vec<_>>())
+    let numeric = scene.derivatives(|c, g| vec![residual(c, g)]);
+    let numeric: Vec<f64> = numeric.iter().map(|d| d[0]).collect();
+    compare(&gradient_of(&equations), &numeric)
 }
 
 /// Checks rows by the gradient and the diagonal of the information that they add up to.
@@ -180,7 +180,7 @@ pub fn assert_rows(
 ) -> Result<(), TestCaseError> {
     let mut equations = NormalEquations::new(scene.spline().n_controls());
     add(&mut equations);
-    let numeric = scene.derivatives(&residuals);
+    let numeric = scene.derivatives(|c, g| residuals(&scene.corrected(c), g));
     let r = residuals(&scene.trajectory, &scene.globals);
     let gradient = numeric
         .iter()

@@ -143,9 +143,9 @@ impl<'a> Linearization<'a> {
                 .par_iter()
                 .map(|rows| self.sum(rows, step, scale))
                 .collect();
-            for (group, part) in &sums {
+            for (group, part) in sums {
                 group.flush(equations);
-                health.merge(part);
+                health.merge(&part);
             }
         }
         health
@@ -179,6 +179,6 @@ impl<'a> Linearization<'a> {
             group.add(plane.residual, w * plane.information);
             health.add(other.is_none(), x, w, n, &surfel.lever);
         }
-        (group, health)
+        (group.summed(), health)
     }
 }

@@ -33,6 +33,8 @@ pub struct Search {
 pub struct Neighbors {
     k: usize,
     indices: Vec<u32>,
+    /// Squared distances; infinite where a place is empty.
+    distances: Vec<f32>,
 }
 
 impl Neighbors {
@@ -41,6 +43,20 @@ impl Neighbors {
         let list = &self.indices[i * self.k..(i + 1) * self.k];
         let n = list.iter().position(|&j| j == NONE).unwrap_or(self.k);
         &list[..n]
+    }
+
+    /// Neighbours of query `i` with their squared distances, nearest first.
+    pub fn with_distances(&self, i: usize) -> impl Iterator<Item = (u32, f32)> + '_ {
+        let places = i * self.k..(i + 1) * self.k;
+        let indices = self.indices[places.clone()].iter().copied();
+        indices
+            .zip(self.distances[places].iter().copied())
+            .take_while(|&(j, _)| j != NONE)
+    }
+
+    /// Longest list.
+    pub fn k(&self) -> usize {
+        self.k
     }
 
     /// Number of queries.
@@ -61,7 +77,7 @@ impl Grid {
     pub fn nearest(&self, queries: &Self, search: &Search) -> Neighbors {
         let arch = Arch::new();
         let tasks: Vec<usize> = (0..queries.n_cells()).step_by(CELLS_PER_TASK).collect();
-        let found: Vec<(Vec<u32>, Vec<u32>)> = tasks
+        let found: Vec<(Vec<u32>, Vec<(f32, u32)>)> = tasks
             .into_par_iter()
             .map(|first| {
                 let cells = first..(first + CELLS_PER_TASK).min(queries.n_cells());
@@ -69,15 +85,21 @@ impl Grid {
                 arch.dispatch(|| self.search_cells(queries, cells, search))
             })
             .collect();
-        let mut indices = vec![NONE; queries.len() * search.k];
+        let k = search.k;
+        let mut indices = vec![NONE; queries.len() * k];
+        let mut distances = vec![f32::INFINITY; queries.len() * k];
         for (originals, lists) in found {
-            for (query, list) in originals.iter().zip(lists.chunks_exact(search.k)) {
-                indices[*query as usize * search.k..][..search.k].copy_from_slice(list);
+            for (query, list) in originals.iter().zip(lists.chunks_exact(k)) {
+                for (place, &(distance, index)) in (*query as usize * k..).zip(list) {
+                    indices[place] = index;
+                    distances[place] = distance;
+                }
             }
         }
         Neighbors {
-            k: search.k,
+            k,
             indices,
+            distances,
         }
     }
 
@@ -88,7 +110,7 @@ impl Grid {
         queries: &Self,
         cells: Range<usize>,
         search: &Search,
-    ) -> (Vec<u32>, Vec<u32>) {
+    ) -> (Vec<u32>, Vec<(f32, u32)>) {
         let (mut originals, mut lists) = (Vec::new(), Vec::new());
         let mut best = Best::new(search);
         for cell in cells {
@@ -100,7 +122,7 @@ impl Grid {
                     self.scan(run, &feature, time, search, &mut best);
                 }
                 originals.push(queries.original(s));
-                lists.extend(best.list.iter().map(|&(_, i)| i));
+                lists.extend_from_slice(&best.list);
             }
         }
         (originals, lists)

@@ -4,6 +4,7 @@
 use faer::linalg::matmul::triangular::{BlockStructure, matmul};
 use faer::{Accum, Mat, MatRef, Par};
 
+use crate::normal_equations::Block;
 use crate::{GlobalVector, N_GLOBALS, NormalEquations};
 
 /// Rows that are gathered before they are multiplied; with their block they fit a core's cache.
@@ -108,37 +109,35 @@ impl RowGroup {
     pub fn flush(self, equations: &mut NormalEquations) {
         let group = self.summed();
         let (first_global, residual) = (6 * group.controls.len(), group.width - 1);
-        equations.cost += group.at(residual, residual);
+        equations.cost += group.column(residual)[residual];
         for (a, &row_control) in group.controls.iter().enumerate() {
             for (b, &column_control) in group.controls[..=a].iter().enumerate() {
-                let block = |r: usize, c: usize| group.at(6 * a + r, 6 * b + c);
-                equations.add_block(row_control, column_control, a == b, block);
+                let block: Block = std::array::from_fn(|c| {
+                    let column = group.column(6 * b + c);
+                    std::array::from_fn(|r| column[6 * a + r])
+                });
+                equations.add_block(row_control, column_control, a == b, &block);
             }
-            let gradient = equations.knot_gradient_mut(row_control);
-            for (r, g) in gradient.iter_mut().enumerate() {
-                *g += group.at(residual, 6 * a + r);
-            }
-            let arrow = equations.arrow_mut(row_control);
-            for (g, column) in arrow.iter_mut().enumerate() {
-                for (r, v) in column.iter_mut().enumerate() {
-                    *v += group.at(first_global + g, 6 * a + r);
+            for r in 0..6 {
+                let column = group.column(6 * a + r);
+                equations.knot_gradient_mut(row_control)[r] += column[residual];
+                let arrow = equations.arrow_mut(row_control);
+                for (g, v) in column[first_global..residual].iter().enumerate() {
+                    arrow[g][r] += v;
                 }
             }
         }
-        for r in 0..N_GLOBALS {
-            equations.global_gradient[r] += group.at(residual, first_global + r);
-            for c in 0..=r {
-                equations.add_corner(r, c, group.at(first_global + r, first_global + c));
+        for c in 0..N_GLOBALS {
+            let column = group.column(first_global + c);
+            equations.global_gradient[c] += column[residual];
+            for r in c..N_GLOBALS {
+                equations.add_corner(r, c, column[first_global + r]);
             }
         }
     }
 
-    /// Entry of the symmetric sum.
-    fn at(&self, r: usize, c: usize) -> f64 {
-        if r >= c {
-            self.sum[(r, c)]
-        } else {
-            self.sum[(c, r)]
-        }
+    /// A column of the sum, of which the entries on and below the diagonal are set.
+    fn column(&self, c: usize) -> &[f64] {
+        self.sum.col_as_slice(c)
     }
 }

@@ -24,6 +24,7 @@ pub(crate) struct SurfelSettings {
     min_planarity: f64,
     min_width_ratio: f64,
     min_width: f64,
+    max_rate: f64,
 }
 
 #[derive(FromPyObject)]
@@ -157,6 +158,7 @@ pub(crate) fn extract_surfels(
         min_planarity: settings.min_planarity,
         min_width_ratio: settings.min_width_ratio,
         min_width: settings.min_width,
+        max_rate: settings.max_rate,
     };
     let points = Points {
         points,

@@ -21,6 +21,7 @@ class SurfelSettings(_Section):
     min_planarity: float = Field(0.3, ge=0, le=1, description="2 (l2 - l1) / (l1 + l2 + l3)")
     min_width_ratio: float = Field(0.03, ge=0, le=1, description="l2 / l3")
     min_width: float = Field(0.05, ge=0, description="sqrt(l2) in voxels; rejects single scan lines")
+    max_rate: float = Field(4000.0, gt=0, description="most surfels per second of data")
 
 
 class RegistrationSettings(_Section):
@@ -47,6 +48,10 @@ class ContinuousSettings(_Section):
 
     window: float = Field(5.0, gt=0, description="length, s")
     shift: float = Field(1.0, gt=0, description="new data per step, s")
+    window_without_imu: float = Field(2.0, gt=0, description="length without an IMU, s")
+    shift_without_imu: float = Field(
+        0.2, gt=0, description="new data per step without an IMU, s: how long velocities are extrapolated"
+    )
     rehearsal: float = Field(
         20.0, ge=0, description="seconds after the start that are run twice, for the calibration; 0: never"
     )
@@ -58,3 +63,9 @@ class ContinuousSettings(_Section):
     )
     surfels: SurfelSettings = SurfelSettings()
     registration: RegistrationSettings = RegistrationSettings()
+
+    def without_imu(self) -> ContinuousSettings:
+        """Return the settings with the window that suits a lidar alone."""
+        return self.model_copy(
+            update={"window": self.window_without_imu, "shift": self.shift_without_imu}
+        )

@@ -103,7 +103,7 @@ impl<'a> Linearization<'a> {
     pub fn new(
         placed: &'a Placed,
         views: &[&FixedView],
-        matches: Vec<Match>,
+        matches: &[Match],
         head: &'a Head,
         settings: &Settings,
     ) -> Self {

@@ -33,11 +33,6 @@ impl RowGroup {
         }
     }
 
-    /// Control points of the group.
-    pub fn controls(&self) -> &[usize] {
-        &self.controls
-    }
-
     /// The row to be filled before [`RowGroup::add`]: six entries per control point.
     pub fn knots_mut(&mut self) -> &mut [f64] {
         &mut self.row[..6 * self.controls.len()]

@@ -70,10 +70,10 @@ pub struct Registration {
 /// # Errors
 /// When the normal equations are singular or hold values that are not finite.
 pub fn register_window(
-    problem: Problem<'_>,
+    problem: &Problem<'_>,
     settings: &Settings,
 ) -> Result<Registration, SolveError> {
-    let mut state = State::new(&problem, settings);
+    let mut state = State::new(problem, settings);
     let mut solver = Solver::default();
     let (mut converged, mut n_outer) = (false, 0);
     let mut last = None;
@@ -85,9 +85,14 @@ pub fn register_window(
             &state.spline,
         );
         let pairs = matches::find(&placed, problem.views, settings);
-        let fixed_rows = state.fixed_rows(&problem, settings);
-        let linearization =
-            Linearization::new(&placed, problem.views, pairs, &state.globals.head, settings);
+        let fixed_rows = state.fixed_rows(problem, settings);
+        let linearization = Linearization::new(
+            &placed,
+            problem.views,
+            &pairs,
+            &state.globals.head,
+            settings,
+        );
         let scale = if n_outer == 0 {
             settings.first_cauchy_scale
         } else {

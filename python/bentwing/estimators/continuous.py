@@ -37,7 +37,10 @@ class Continuous:
     """
 
     def __init__(
-        self, payload: Payload, settings: ContinuousSettings | None = None, threads: int | None = None
+        self,
+        payload: Payload,
+        settings: ContinuousSettings | None = None,
+        threads: int | None = None,
     ) -> None:
         self.settings = settings or ContinuousSettings()
         self._payload = payload
@@ -113,9 +116,7 @@ class Continuous:
         quat = start.quat_xyzw
         if learned is not None and start.static is not None:
             quat = attitude_of(start.static.accel_mean - slow.accel_bias)
-        samples = _core.Samples(
-            self._first, DT, np.zeros((n, 3)), np.repeat(quat[None], n, axis=0)
-        )
+        samples = _core.Samples(self._first, DT, np.zeros((n, 3)), np.repeat(quat[None], n, axis=0))
         has_imu = self._buffer.has_imu and self._payload.imu is not None
         if learned is None:
             prior = SlowStatePrior(
@@ -134,24 +135,34 @@ class Continuous:
             prior,
             self.settings,
             self._core,
-            self._threads,
+            threads=self._threads,
             clamped=start.static is not None,
         )
 
     def _initial_globals(self, start: Start) -> _core.Globals:
         encoder, gravity = self._payload.encoder, (0.0, 0.0, STANDARD_GRAVITY)
-        biases = {"gyro_bias": tuple(start.gyro_bias), "accel_bias": tuple(start.accel_bias)}
         if encoder is None:
             T = self._payload.T_imu_lidar
-            base = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)) if T is None else (T.translation, T.quaternion)
-            return _core.Globals(base, latency=0.0, gravity=gravity, **biases)
+            base = (
+                ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
+                if T is None
+                else (T.translation, T.quaternion)
+            )
+            return _core.Globals(
+                base,
+                latency=0.0,
+                gyro_bias=start.gyro_bias,
+                accel_bias=start.accel_bias,
+                gravity=gravity,
+            )
         return _core.Globals(
             (encoder.T_imu_motor.translation, encoder.T_imu_motor.quaternion),
             latency=0.0,
+            gyro_bias=start.gyro_bias,
+            accel_bias=start.accel_bias,
             gravity=gravity,
             motor_axis=encoder.axis,
             T_motor_lidar=(encoder.T_motor_lidar.translation, encoder.T_motor_lidar.quaternion),
-            **biases,
         )
 
     def _learned_globals(self, learned: OdometryPass) -> _core.Globals:
@@ -200,7 +211,10 @@ class Continuous:
             trajectory,
             calibration,
             windows=last.windows,
-            counts={"estimate.windows": len(last.windows), "estimate.samples_without_imu": last.n_blind},
+            counts={
+                "estimate.windows": len(last.windows),
+                "estimate.samples_without_imu": last.n_blind,
+            },
             timings=last.timings,
             warnings=_warnings(last),
         )
@@ -213,7 +227,7 @@ def _levelling(gravity: NDArray[np.float64]) -> NDArray[np.float64]:
     sine = float(np.linalg.norm(axis))
     if sine < 1e-12:
         return np.array([0.0, 0.0, 0.0, 1.0])
-    return geometry.exp((axis / sine * np.arctan2(sine, up[2]))[None])[0]
+    return geometry.exp((axis / sine * np.arctan2(sine, up[2]))[None]).reshape(4)
 
 
 def _warnings(last: OdometryPass) -> list[str]:

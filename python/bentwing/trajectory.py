@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 _TUM_COLUMNS = 8
-_BLOCK = 16384  # points at a time, so that the intermediate arrays stay in the cache
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,27 +83,6 @@ class Trajectory:
         p = self.positions
         positions = p[i] + shares[:, None] * (p[i + 1] - p[i])
         return positions, geometry.slerp(self.quats_xyzw[i], self.quats_xyzw[i + 1], shares)
-
-    def transform_points(
-        self, points_imu: NDArray[np.float64], times: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
-        """Bring points, each seen at its own time, from the moving IMU frame into the map.
-
-        Parameters
-        ----------
-        points_imu : (N, 3) float64, m, imu frame at the time of each
-        times : (N,) float64, s since the recording's start, IMU clock
-
-        Returns
-        -------
-        (N, 3) float64, m, map frame
-        """
-        points = np.empty((len(times), 3))
-        for start in range(0, len(times), _BLOCK):
-            block = slice(start, start + _BLOCK)
-            positions, quats = self.interpolate(times[block])
-            np.add(positions, geometry.rotate(quats, points_imu[block]), out=points[block])
-        return points
 
     def write_tum(self, path: Path, clock_origin_ns: int) -> None:
         """Write `t x y z qx qy qz qw` with absolute stamps that are exact to the nanosecond.

@@ -11,7 +11,9 @@ from bentwing import _core, geometry
 from bentwing.errors import NotEnoughDataError
 from bentwing.estimators.buffer import BatchBuffer
 from bentwing.estimators.core_settings import CoreSettings
+from bentwing.estimators.core_states import core_globals, refined_mount
 from bentwing.estimators.interface import Calibration, Estimate
+from bentwing.estimators.mount import described_mount
 from bentwing.estimators.odometry_pass import DT, MARGIN, OdometryPass
 from bentwing.estimators.settings import ContinuousSettings
 from bentwing.estimators.slow_states import SlowStatePrior, named_std
@@ -44,6 +46,7 @@ class Continuous:
     ) -> None:
         self.settings = settings or ContinuousSettings()
         self._payload = payload
+        self._mount = described_mount(payload)
         self._threads = threads or 0
         self._core = CoreSettings.of(self.settings.registration, payload, DT)
         self._buffer = BatchBuffer()
@@ -66,6 +69,16 @@ class Continuous:
             There is no second of lidar data.
         """
         self._advance(finishing=True)
+        return self.so_far()
+
+    def so_far(self) -> Estimate:
+        """Return what the windows registered so far say.
+
+        Raises
+        ------
+        NotEnoughDataError
+            There is none yet.
+        """
         if self._pass is None or not self._pass.windows:
             msg = f"less than {self.settings.shift:g} s of lidar points; nothing can be estimated"
             raise NotEnoughDataError(msg)
@@ -140,29 +153,14 @@ class Continuous:
         )
 
     def _initial_globals(self, start: Start) -> _core.Globals:
-        encoder, gravity = self._payload.encoder, (0.0, 0.0, STANDARD_GRAVITY)
-        if encoder is None:
-            T = self._payload.T_imu_lidar
-            base = (
-                ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
-                if T is None
-                else (T.translation, T.quaternion)
-            )
-            return _core.Globals(
-                base,
+        return core_globals(
+            Calibration(
                 latency=0.0,
+                mount=self._mount,
                 gyro_bias=start.gyro_bias,
                 accel_bias=start.accel_bias,
-                gravity=gravity,
+                gravity=np.array([0.0, 0.0, STANDARD_GRAVITY]),
             )
-        return _core.Globals(
-            (encoder.T_imu_motor.translation, encoder.T_imu_motor.quaternion),
-            latency=0.0,
-            gyro_bias=start.gyro_bias,
-            accel_bias=start.accel_bias,
-            gravity=gravity,
-            motor_axis=encoder.axis,
-            T_motor_lidar=(encoder.T_motor_lidar.translation, encoder.T_motor_lidar.quaternion),
         )
 
     def _learned_globals(self, learned: OdometryPass) -> _core.Globals:
@@ -199,12 +197,10 @@ class Continuous:
         slow = last.globals
         calibration = Calibration(
             latency=slow.latency,
-            T_imu_lidar_translation=slow.base_translation,
-            T_imu_lidar_quat_xyzw=slow.base_quat_xyzw,
+            mount=refined_mount(self._mount, slow),
             gyro_bias=slow.gyro_bias,
             accel_bias=slow.accel_bias,
             gravity=np.array([0.0, 0.0, STANDARD_GRAVITY]),
-            encoder_zero=slow.encoder_zero,
             std=named_std(last.covariance, last.prior.frozen),
         )
         return Estimate(

@@ -1,18 +1,384 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-# The compiled core. Arrays must be C-contiguous and must not be modified during a call.
+"""The compiled core.
+
+Arrays must be C-contiguous and must not be modified during a call; the GIL is released meanwhile.
+A wrong shape, a value that is not finite or a time that decreases is a ValueError that names the
+argument and the row. Times are seconds since the recording's start, lengths metres, angles
+radians, quaternions x y z w; `threads` 0 means one per core, and no result depends on it.
+"""
+
+from collections.abc import Sequence
+from typing import TypeAlias, final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bentwing.estimators.core_settings import CoreSettings
+from bentwing.estimators.settings import SurfelSettings
+
+__all__ = [
+    "FixedView",
+    "Globals",
+    "Imu",
+    "Registration",
+    "Samples",
+    "Scene",
+    "Surfels",
+    "__version__",
+    "extract_surfels",
+    "register_window",
+]
+
 __version__: str
 
+_Vector: TypeAlias = Sequence[float] | NDArray[np.float64]
+_Transform: TypeAlias = tuple[_Vector, _Vector]
+"""Translation (3,) m and unit quaternion (4,)."""
+
+@final
 class Scene:
-    def __init__(self, vertices: NDArray[np.float64], triangles: NDArray[np.uint32]) -> None: ...
+    """Triangles that can be asked for the first hit along a ray and the nearest point.
+
+    Parameters
+    ----------
+    vertices : (V, 3) float64, m
+    triangles : (T, 3) uint32, vertices of each, counter-clockwise seen from outside
+    """
+
+    def __new__(cls, vertices: NDArray[np.float64], triangles: NDArray[np.uint32]) -> Scene: ...
     @property
-    def n_triangles(self) -> int: ...
+    def n_triangles(self) -> int:
+        """Number of triangles."""
+
     def cast(
         self, origins: NDArray[np.float64], directions: NDArray[np.float64], max_range: float
-    ) -> tuple[NDArray[np.float64], NDArray[np.int32]]: ...
+    ) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+        """Find the first surface along each ray.
+
+        Parameters
+        ----------
+        origins, directions : (N, 3) float64, m and unit vectors
+        max_range : m
+
+        Returns
+        -------
+        ranges : (N,) float64, m, infinity where there is none
+        triangles : (N,) int32, -1 where there is none
+        """
+
     def distance(
         self, points: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.int32]]: ...
+    ) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+        """Find the nearest surface of each point.
+
+        Parameters
+        ----------
+        points : (N, 3) float64, m
+
+        Returns
+        -------
+        distances : (N,) float64, m, negative behind the surface
+        triangles : (N,) int32
+        """
+
+@final
+class Imu:
+    """Inertial samples in time order.
+
+    Parameters
+    ----------
+    stamps : (M,) float64, s, IMU clock, non-decreasing
+    gyro, accel : (M, 3) float64, rad/s and m/s² (specific force), imu frame
+    """
+
+    def __new__(
+        cls, stamps: NDArray[np.float64], gyro: NDArray[np.float64], accel: NDArray[np.float64]
+    ) -> Imu: ...
+    def __len__(self) -> int: ...
+
+@final
+class Globals:
+    """The slow states: latency, extrinsics, motor, biases, gravity.
+
+    Parameters
+    ----------
+    T_imu_base : pose of the lidar, or of the motor that turns it, in the imu frame
+    latency : s, lidar stamps minus IMU clock
+    gyro_bias, accel_bias : (3,) rad/s and m/s², imu frame
+    gravity : (3,) m/s², map frame, pointing up
+    motor_axis : (3,) motor frame; only for motor-turned lidars, with `T_motor_lidar`
+    encoder_zero : rad, added to every encoder angle
+    T_motor_lidar : pose of the lidar in the rotating motor frame
+    """
+
+    def __new__(
+        cls,
+        T_imu_base: _Transform,
+        *,
+        latency: float,
+        gyro_bias: _Vector,
+        accel_bias: _Vector,
+        gravity: _Vector,
+        motor_axis: _Vector | None = None,
+        encoder_zero: float = 0.0,
+        T_motor_lidar: _Transform | None = None,
+    ) -> Globals: ...
+    @property
+    def latency(self) -> float:
+        """Lidar stamps minus IMU clock, s."""
+
+    @property
+    def base_translation(self) -> NDArray[np.float64]:
+        """Translation (3,) of the lidar (or motor) in the imu frame, m."""
+
+    @property
+    def base_quat_xyzw(self) -> NDArray[np.float64]:
+        """Rotation (4,) of the lidar (or motor) in the imu frame."""
+
+    @property
+    def gyro_bias(self) -> NDArray[np.float64]:
+        """Gyro bias (3,), rad/s, imu frame."""
+
+    @property
+    def accel_bias(self) -> NDArray[np.float64]:
+        """Accelerometer bias (3,), m/s², imu frame."""
+
+    @property
+    def gravity(self) -> NDArray[np.float64]:
+        """Gravity (3,), m/s², map frame, pointing up."""
+
+    @property
+    def encoder_zero(self) -> float:
+        """Added to every encoder angle, rad; zero without a motor."""
+
+    @property
+    def motor_lidar_translation(self) -> NDArray[np.float64] | None:
+        """Translation (3,) of the lidar in the rotating motor frame, m; None without a motor."""
+
+    @property
+    def motor_lidar_quat_xyzw(self) -> NDArray[np.float64] | None:
+        """Rotation (4,) of the lidar in the rotating motor frame; None without a motor."""
+
+    def levelled(self) -> Globals:
+        """Return the same states with gravity straight up."""
+
+@final
+class Samples:
+    """Poses `T_map_imu` at a uniform rate; between them p is linear and R is slerped.
+
+    Parameters
+    ----------
+    start : s, time of the first sample
+    dt : s, interval of the samples
+    positions : (N, 3) float64, m, map frame, at least two
+    quats_xyzw : (N, 4) float64, unit
+    """
+
+    def __new__(
+        cls,
+        start: float,
+        dt: float,
+        positions: NDArray[np.float64],
+        quats_xyzw: NDArray[np.float64],
+    ) -> Samples: ...
+    def __len__(self) -> int: ...
+    @property
+    def start(self) -> float:
+        """Time of the first sample, s."""
+
+    @property
+    def end(self) -> float:
+        """Time of the last sample, s."""
+
+    @property
+    def positions(self) -> NDArray[np.float64]:
+        """Positions (N, 3), m, map frame."""
+
+    @property
+    def quats_xyzw(self) -> NDArray[np.float64]:
+        """Rotations (N, 4)."""
+
+    def slice(self, first: int, last: int) -> Samples:
+        """Return the samples `first` to `last`, both included."""
+
+    def position_at(self, time: float) -> NDArray[np.float64]:
+        """Return the position (3,), m, map frame; beyond the ends that of the first or last sample."""
+
+    def replaced(self, first: int, newer: Samples) -> Samples:
+        """Return these samples with those from `first` on replaced by `newer`."""
+
+    def extended(self, imu: Imu | None, globals: Globals, until: float) -> tuple[Samples, int]:
+        """Extend by the IMU, or at constant velocity without one.
+
+        Returns
+        -------
+        samples : up to the first at or after `until`, s
+        n_blind : number of new samples for which the IMU had a gap
+        """
+
+    def place(
+        self,
+        points: NDArray[np.float64],
+        stamps: NDArray[np.float64],
+        angles: NDArray[np.float64] | None,
+        globals: Globals,
+        *,
+        threads: int = 0,
+    ) -> NDArray[np.float64]:
+        """Place lidar points in the map (Kaul 2015, eq. 1 and 2).
+
+        Parameters
+        ----------
+        points : (N, 3) float64, m, lidar frame
+        stamps : (N,) float64, s, lidar clock, non-decreasing
+        angles : (N,) float64, rad, encoder angle at each point; None without a motor
+        globals : latency and mount of the lidar
+
+        Returns
+        -------
+        (N, 3) float64, m, map frame; times beyond the samples take the first or last pose
+        """
+
+@final
+class Surfels:
+    """Surfels of a stretch of time, in the lidar frame at their mean stamps."""
+
+    def __len__(self) -> int: ...
+    @property
+    def stamps(self) -> NDArray[np.float64]:
+        """Mean stamps (N,), s, lidar clock."""
+
+    @property
+    def means(self) -> NDArray[np.float64]:
+        """Means (N, 3), m, lidar frame."""
+
+    @property
+    def normals(self) -> NDArray[np.float64]:
+        """Unit normals (N, 3) towards the sensor, lidar frame."""
+
+    @property
+    def voxel_sizes(self) -> NDArray[np.float64]:
+        """Voxel size (N,) of each surfel's level, m."""
+
+def extract_surfels(
+    points: NDArray[np.float64],
+    stamps: NDArray[np.float64],
+    angles: NDArray[np.float64] | None,
+    samples: Samples,
+    globals: Globals,
+    *,
+    settings: SurfelSettings,
+    threads: int = 0,
+) -> Surfels:
+    """Extract surfels from lidar points placed with `samples` (Kaul 2015, section 2.1).
+
+    Parameters
+    ----------
+    points, stamps, angles, globals : as in `Samples.place`
+    """
+
+@final
+class FixedView:
+    """Immovable surfels in the map.
+
+    Parameters
+    ----------
+    sets : surfels to choose from
+    start, stop : s, those with stamps in `[start, stop)` are frozen where `samples` puts them
+    """
+
+    def __new__(
+        cls, sets: Sequence[Surfels], start: float, stop: float, samples: Samples, globals: Globals
+    ) -> FixedView: ...
+    def __len__(self) -> int: ...
+
+@final
+class Registration:
+    """Result of a registration."""
+
+    @property
+    def samples(self) -> Samples:
+        """Corrected trajectory."""
+
+    @property
+    def globals(self) -> Globals:
+        """Corrected slow states."""
+
+    @property
+    def covariance(self) -> NDArray[np.float64]:
+        """Covariance (20, 20) of the slow states; zero where frozen."""
+
+    @property
+    def n_surfels(self) -> int:
+        """Surfels that took part."""
+
+    @property
+    def n_matches(self) -> int:
+        """Matches within the window."""
+
+    @property
+    def n_fixed_matches(self) -> int:
+        """Matches with fixed views."""
+
+    @property
+    def inlier_share(self) -> float:
+        """Share of the matches with a residual below two standard deviations."""
+
+    @property
+    def residual_rms(self) -> float:
+        """Weighted root mean square of the matches' residuals in standard deviations."""
+
+    @property
+    def translation_eigenvalues(self) -> list[float]:
+        """Eigenvalues (3) of the mean outer product of the matches' normals, increasing."""
+
+    @property
+    def rotation_eigenvalues(self) -> list[float]:
+        """Eigenvalues (3) of the mean outer product of the rotations the matches see, increasing."""
+
+    @property
+    def weakest_direction(self) -> list[float]:
+        """Direction (3) in the map in which the matches say least about the translation."""
+
+    @property
+    def n_outer(self) -> int:
+        """Outer iterations."""
+
+    @property
+    def converged(self) -> bool:
+        """Whether the last step was below the thresholds."""
+
+    @property
+    def n_blind(self) -> int:
+        """Samples of the trajectory without inertial data."""
+
+def register_window(
+    samples: Samples,
+    surfels: Sequence[Surfels],
+    views: Sequence[FixedView],
+    imu: Imu | None,
+    globals: Globals,
+    *,
+    information: NDArray[np.float64],
+    frozen: Sequence[bool],
+    clamped: bool,
+    settings: CoreSettings,
+    threads: int = 0,
+) -> Registration:
+    """Correct a trajectory and the slow states by surfel matches and inertial samples.
+
+    Parameters
+    ----------
+    information : (20, 20) float64 about the slow states' values in `globals`
+    frozen : (20) slow states that are not estimated
+    clamped : whether the start continues a frozen past (the first three control points stay);
+        otherwise only the first pose stays
+
+    Raises
+    ------
+    SingularSystemError, DivergedError
+
+    References
+    ----------
+    Kaul 2015, section 2.1
+    """

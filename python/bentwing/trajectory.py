@@ -12,14 +12,13 @@ import numpy as np
 
 from bentwing import geometry
 from bentwing.atomic import write_text
+from bentwing.clock import NS_PER_S, Clock
 from bentwing.errors import InputError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-_NS = 1_000_000_000
 _TUM_COLUMNS = 8
-_BLOCK = 16384  # points at a time, so that the intermediate arrays stay in the cache
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,27 +84,6 @@ class Trajectory:
         positions = p[i] + shares[:, None] * (p[i + 1] - p[i])
         return positions, geometry.slerp(self.quats_xyzw[i], self.quats_xyzw[i + 1], shares)
 
-    def transform_points(
-        self, points_imu: NDArray[np.float64], times: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
-        """Bring points, each seen at its own time, from the moving IMU frame into the map.
-
-        Parameters
-        ----------
-        points_imu : (N, 3) float64, m, imu frame at the time of each
-        times : (N,) float64, s since the recording's start, IMU clock
-
-        Returns
-        -------
-        (N, 3) float64, m, map frame
-        """
-        points = np.empty((len(times), 3))
-        for start in range(0, len(times), _BLOCK):
-            block = slice(start, start + _BLOCK)
-            positions, quats = self.interpolate(times[block])
-            np.add(positions, geometry.rotate(quats, points_imu[block]), out=points[block])
-        return points
-
     def write_tum(self, path: Path, clock_origin_ns: int) -> None:
         """Write `t x y z qx qy qz qw` with absolute stamps that are exact to the nanosecond.
 
@@ -114,13 +92,11 @@ class Trajectory:
         path : file to write, atomically
         clock_origin_ns : absolute time of `times == 0`, ns UTC
         """
-        stamps_ns = clock_origin_ns + np.rint(self.times * _NS).astype(np.int64)
+        stamps = Clock(clock_origin_ns).to_absolute_text(self.times)
         poses = np.hstack([self.positions, self.quats_xyzw])
         lines = [
-            f"{_seconds(stamp)} {x:.6f} {y:.6f} {z:.6f} {qx:.9f} {qy:.9f} {qz:.9f} {qw:.9f}\n"
-            for stamp, (x, y, z, qx, qy, qz, qw) in zip(
-                stamps_ns.tolist(), poses.tolist(), strict=True
-            )
+            f"{stamp} {x:.6f} {y:.6f} {z:.6f} {qx:.9f} {qy:.9f} {qz:.9f} {qw:.9f}\n"
+            for stamp, (x, y, z, qx, qy, qz, qw) in zip(stamps, poses.tolist(), strict=True)
         ]
         write_text(Path(path), "".join(lines))
 
@@ -165,7 +141,7 @@ def read_tum(path: Path, clock_origin_ns: int | None = None) -> tuple[Trajectory
     if not np.isfinite(values).all() or (lengths == 0).any():
         msg = f"{path}: a pose is not finite or has a quaternion of length zero"
         raise InputError(msg)
-    return Trajectory(relative_ns / _NS, values[:, :3].copy(), values[:, 3:] / lengths), origin
+    return Trajectory(relative_ns / NS_PER_S, values[:, :3].copy(), values[:, 3:] / lengths), origin
 
 
 def _parse_tum(path: Path) -> tuple[list[int], list[list[float]]]:
@@ -182,7 +158,7 @@ def _parse_tum(path: Path) -> tuple[list[int], list[list[float]]]:
             continue
         try:
             stamp, *pose = fields[:_TUM_COLUMNS]
-            stamps_ns.append(int((Decimal(stamp) * _NS).to_integral_value()))
+            stamps_ns.append(int((Decimal(stamp) * NS_PER_S).to_integral_value()))
             poses.append([float(value) for value in pose])
             complete = len(pose) == _TUM_COLUMNS - 1
         except (InvalidOperation, ValueError, OverflowError):
@@ -194,9 +170,3 @@ def _parse_tum(path: Path) -> tuple[list[int], list[list[float]]]:
         msg = f"{path}: holds no pose; expected lines of `t x y z qx qy qz qw`"
         raise InputError(msg)
     return stamps_ns, poses
-
-
-def _seconds(stamp_ns: int) -> str:
-    sign = "-" if stamp_ns < 0 else ""
-    seconds, nanoseconds = divmod(abs(stamp_ns), _NS)
-    return f"{sign}{seconds}.{nanoseconds:09d}"

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from bentwing import pipeline
+from bentwing import pipeline, run_settings
 from bentwing.cli.commands import COMMANDS
 from bentwing.cli.main import run_command
 from bentwing.errors import BentwingError, EstimationError, RecordingError, UsageError
@@ -116,7 +116,7 @@ def test_options_reach_the_pipeline(called, capsys):
 
 
 def test_settings_are_shown_without_a_recording(called, capsys, monkeypatch):
-    monkeypatch.setattr(pipeline, "settings_text", lambda *asked: f"{asked}")
+    monkeypatch.setattr(run_settings, "settings_text", lambda *asked: f"{asked}")
     assert run_command(["map", "--print-settings", "--payload", "head.yaml"]) == 0
     assert "('continuous', PosixPath('head.yaml'))" in capsys.readouterr().out
     assert called == []
@@ -166,7 +166,7 @@ def test_an_unexpected_error_asks_to_be_reported(monkeypatch, capsys, debug):
 def test_an_interrupt_ends_a_running_command_within_a_second(tmp_path):
     script = f"""
 import time
-from bentwing import pipeline
+from bentwing import pipeline, run_settings
 def busy(*_, **__):
     print("busy", flush=True)
     time.sleep(60)

@@ -10,9 +10,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from bentwing.clock import Clock
 from bentwing.errors import BentwingError
 from bentwing.recording import LidarBatch, Payload, Recording, wire_clouds
-from bentwing.recording.clock import Clock
 from bentwing.recording.lidar_stream import LidarStream
 from bentwing.recording.point_cloud2 import columns
 from bentwing.recording.point_times import TimeReading

@@ -9,8 +9,10 @@ import pytest
 from bentwing import estimators, pipeline
 from bentwing.errors import EstimationError, UsageError
 from bentwing.estimators.interface import Calibration, Estimate
+from bentwing.estimators.mount import described_mount
 from bentwing.map.read import read_points
 from bentwing.recording import Clock, ImuBatch, LidarBatch, Payload
+from bentwing.run_settings import settings_text
 from bentwing.trajectory import Trajectory, read_tum
 
 ORIGIN_NS = 1_700_000_000_000_000_001
@@ -57,14 +59,16 @@ class FakeEstimator:
             raise EstimationError("no matches")
 
     def result(self):
+        return self.so_far()
+
+    def so_far(self):
         times = np.arange(0, self.last + 0.01, 0.01)
         trajectory = Trajectory(
             times, np.zeros((len(times), 3)), np.tile([0.0, 0, 0, 1], (len(times), 1))
         )
         calibration = Calibration(
             0.0,
-            np.zeros(3),
-            np.array([0, 0, 0, 1.0]),
+            described_mount(PAYLOAD),
             np.zeros(3),
             np.zeros(3),
             np.array([0, 0, 9.8]),
@@ -150,4 +154,4 @@ def test_wrong_options_are_refused_before_anything_is_written(tmp_path, recordin
 
 def test_settings_are_told_as_yaml(recording):
     del recording
-    assert "T_imu_lidar" in pipeline.settings_text("continuous", PAYLOAD)
+    assert "T_imu_lidar" in settings_text("continuous", PAYLOAD)

@@ -9,6 +9,7 @@ from bentwing import run_record
 from bentwing.atomic import write_text
 from bentwing.errors import EstimationError, UsageError
 from bentwing.estimators.interface import Calibration, Estimate
+from bentwing.estimators.mount import FixedMount, Pose
 from bentwing.run_folder import RunFolder, read_record
 from bentwing.run_record import describe_input, plain
 from bentwing.trajectory import Trajectory
@@ -22,8 +23,9 @@ def estimate():
     trajectory = Trajectory(
         np.array([0.0, 0.01]), np.zeros((2, 3)), np.tile([0.0, 0, 0, 1], (2, 1))
     )
+    mount = FixedMount(Pose(np.zeros(3), np.array([0, 0, 0, 1.0])))
     calibration = Calibration(
-        0.002, np.zeros(3), np.array([0, 0, 0, 1.0]), np.zeros(3), np.zeros(3), np.array([0, 0, 9.8]),
+        0.002, mount, np.zeros(3), np.zeros(3), np.array([0, 0, 9.8]),
         std={"latency": [1e-5]},
     )  # fmt: skip
     windows = [{"time": np.float64(1.0), "n_matches": np.int64(7), "residual_rms": np.nan}]

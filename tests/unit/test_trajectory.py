@@ -32,14 +32,6 @@ def test_samples_themselves_are_returned_at_their_times():
     assert np.allclose(np.abs(np.sum(quats * trajectory.quats_xyzw, axis=1)), 1.0, atol=1e-12)
 
 
-def test_a_fixed_point_seen_from_the_moving_frame_comes_back_to_one_place():
-    trajectory, target = screw(), np.array([3.0, -2.0, 7.0])
-    times = np.random.default_rng(1).uniform(0, 1.99, 300)
-    positions, quats = trajectory.interpolate(times)
-    seen = geometry.rotate(geometry.inverse(quats), target - positions)
-    assert np.allclose(trajectory.transform_points(seen, times), target, atol=1e-12)
-
-
 def test_times_outside_the_trajectory_are_refused_and_named():
     with pytest.raises(ValueError, match=r"2\.500000 s in row 1"):
         screw().interpolate(np.array([0.0, 2.5]))

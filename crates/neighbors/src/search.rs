@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The k nearest features that were seen at another time.
 
+#![allow(
+    clippy::inline_always,
+    reason = "only what is inlined into a dispatched function uses the machine's instructions"
+)]
+
 use std::ops::Range;
 
 use pulp::Arch;
@@ -16,6 +21,9 @@ const LANES: usize = 16;
 
 /// Query cells per parallel task.
 const CELLS_PER_TASK: usize = 64;
+
+/// Original indices of queries, and their lists of distances and indices one after the other.
+type Found = (Vec<u32>, Vec<(f32, u32)>);
 
 /// What counts as a neighbour.
 #[derive(Clone, Copy, Debug)]
@@ -77,7 +85,7 @@ impl Grid {
     pub fn nearest(&self, queries: &Self, search: &Search) -> Neighbors {
         let arch = Arch::new();
         let tasks: Vec<usize> = (0..queries.n_cells()).step_by(CELLS_PER_TASK).collect();
-        let found: Vec<(Vec<u32>, Vec<(f32, u32)>)> = tasks
+        let found: Vec<Found> = tasks
             .into_par_iter()
             .map(|first| {
                 let cells = first..(first + CELLS_PER_TASK).min(queries.n_cells());
@@ -105,12 +113,7 @@ impl Grid {
 
     /// Original indices of the queries in `cells`, and their lists one after the other.
     #[inline(always)]
-    fn search_cells(
-        &self,
-        queries: &Self,
-        cells: Range<usize>,
-        search: &Search,
-    ) -> (Vec<u32>, Vec<(f32, u32)>) {
+    fn search_cells(&self, queries: &Self, cells: Range<usize>, search: &Search) -> Found {
         let (mut originals, mut lists) = (Vec::new(), Vec::new());
         let mut best = Best::new(search);
         for cell in cells {

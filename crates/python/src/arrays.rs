@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Checked views of NumPy arrays: shape, layout, finiteness and order of time.
+//! Checked views of `NumPy` arrays: shape, layout, finiteness and order of time.
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use numpy::{PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods, ToPyArray};
@@ -19,13 +19,10 @@ pub(crate) fn rows<'a, T: numpy::Element, const D: usize>(
         );
         return Err(PyValueError::new_err(message));
     }
-    let not_contiguous = || PyValueError::new_err(format!("{name}: expected a C-contiguous array"));
     // `as_slice` alone would accept Fortran order and read columns as rows.
-    if !array.is_c_contiguous() {
-        return Err(not_contiguous());
-    }
-    let flat = array.as_slice().map_err(|_| not_contiguous())?;
-    Ok(flat.as_chunks().0)
+    let flat = array.as_slice().ok().filter(|_| array.is_c_contiguous());
+    let not_contiguous = || PyValueError::new_err(format!("{name}: expected a C-contiguous array"));
+    Ok(flat.ok_or_else(not_contiguous)?.as_chunks().0)
 }
 
 /// As [`rows`], for coordinates: refuses NaN and infinity.
@@ -52,9 +49,8 @@ pub(crate) fn finite<'a>(
     array: &'a PyReadonlyArray1<'_, f64>,
     n: usize,
 ) -> PyResult<&'a [f64]> {
-    let values = array
-        .as_slice()
-        .map_err(|_| PyValueError::new_err(format!("{name}: expected a contiguous array")))?;
+    let not_contiguous = || PyValueError::new_err(format!("{name}: expected a contiguous array"));
+    let values = array.as_slice().ok().ok_or_else(not_contiguous)?;
     if values.len() != n {
         let message = format!("{name}: expected shape ({n},), got ({},)", values.len());
         return Err(PyValueError::new_err(message));

@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Python bindings: checks arrays, releases the GIL, maps errors; holds no algorithm.
 
+#![allow(
+    clippy::needless_pass_by_value,
+    reason = "PyO3 hands arrays and lists over by value"
+)]
+
 use pyo3::prelude::*;
 
 mod arrays;

@@ -347,7 +347,7 @@ pub(crate) fn register_window(
         },
     };
     let settings = settings.into();
-    in_pool(py, threads, || core::register_window(problem, &settings))?
+    in_pool(py, threads, || core::register_window(&problem, &settings))?
         .map(Registration)
         .map_err(|e| solve_error(py, &e))
 }

@@ -211,6 +211,7 @@ impl Globals {
         T_imu_base, *, latency, gyro_bias, accel_bias, gravity,
         motor_axis = None, encoder_zero = 0.0, T_motor_lidar = None,
     ))]
+    #[allow(clippy::too_many_arguments, reason = "the states by name")]
     fn new(
         T_imu_base: Transform,
         latency: f64,

@@ -99,11 +99,14 @@ impl Factor {
     }
 }
 
+/// Which blocks of the normal equations there are.
+type Structure = Vec<(usize, usize)>;
+
 /// Solves normal equations; keeps the symbolic factorization while their structure is the same.
 #[derive(Default)]
 pub struct Solver {
-    symbolic: Option<(Vec<(usize, usize)>, Layout, SymbolicLlt<usize>)>,
-    /// Used instead of [`DENSE_LIMIT`] by tests and benches.
+    symbolic: Option<(Structure, Layout, SymbolicLlt<usize>)>,
+    /// Used instead of the measured limit by tests and benches.
     pub dense_limit: Option<usize>,
 }
 
@@ -162,7 +165,7 @@ impl Solver {
         });
         let matrix = SparseColMat::try_new_from_triplets(n, n, &triplets)
             .map_err(|e| failed(&format!("{e:?}")))?;
-        let keys: Vec<(usize, usize)> = equations.blocks.keys().copied().collect();
+        let keys: Structure = equations.blocks.keys().copied().collect();
         let reusable = self
             .symbolic
             .take()

@@ -70,10 +70,10 @@ pub struct Registration {
 /// # Errors
 /// When the normal equations are singular or hold values that are not finite.
 pub fn register_window(
-    problem: Problem<'_>,
+    problem: &Problem<'_>,
     settings: &Settings,
 ) -> Result<Registration, SolveError> {
-    let mut state = State::new(&problem, settings);
+    let mut state = State::new(problem, settings);
     let mut solver = Solver::default();
     let (mut step_size, mut n_outer) = (StepSize::UNKNOWN, 0);
     let (mut pairs, mut last) = (Vec::new(), None);
@@ -87,7 +87,7 @@ pub fn register_window(
         if step_size.moves_matches() {
             pairs = matches::find(&placed, problem.views, settings);
         }
-        let fixed_rows = state.fixed_rows(&problem, settings);
+        let fixed_rows = state.fixed_rows(problem, settings);
         let linearization = Linearization::new(
             &placed,
             problem.views,

@@ -81,7 +81,7 @@ pub fn extract(
                 cell.key = coarser(cell.key);
             }
         }
-        cells = merge(cells, settings);
+        cells = merge(&cells, settings);
         let size = settings.voxel_size * f64::from(1u32 << level);
         for cell in &cells {
             if push_surfel(
@@ -170,8 +170,8 @@ fn runs(
 }
 
 /// Merges cells of the same voxel as long as neither a pause nor the span of time forbids it.
-fn merge(cells: Vec<Cell>, settings: &Settings) -> Vec<Cell> {
-    let mut order: Vec<(u64, u32)> = (0u32..).zip(&cells).map(|(i, c)| (c.key, i)).collect();
+fn merge(cells: &[Cell], settings: &Settings) -> Vec<Cell> {
+    let mut order: Vec<(u64, u32)> = (0u32..).zip(cells).map(|(i, c)| (c.key, i)).collect();
     order.sort_unstable_by(|a, b| {
         let time = |i: u32| cells[i as usize].moments.span().0;
         a.0.cmp(&b.0)

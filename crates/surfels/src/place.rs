@@ -59,14 +59,12 @@ impl<'a> Placer<'a> {
 
     fn in_imu(&self, p: &[f64; 3], angle: f64) -> Vector3<f64> {
         let p = Vector3::from(*p);
-        match self.head.motor {
-            None => self.R_imu_lidar * p + self.t_imu_lidar,
-            Some(_) => {
-                let T: &Isometry3<f64> = &self.head.T_imu_base;
-                T.transform_point(&self.head.point_in_base(&p, angle).into())
-                    .coords
-            }
+        if self.head.motor.is_none() {
+            return self.R_imu_lidar * p + self.t_imu_lidar;
         }
+        let T: &Isometry3<f64> = &self.head.T_imu_base;
+        T.transform_point(&self.head.point_in_base(&p, angle).into())
+            .coords
     }
 
     fn place(&self, p: &[f64; 3], stamp: f64, angle: f64) -> [f64; 3] {

@@ -39,17 +39,19 @@ def map_command(
     ] = False,
 ) -> None:
     """Turn a recording into a trajectory, a map and a report."""
-    from bentwing import pipeline  # slow to import, so only when it is needed
+    # slow to import, so only when it is needed
     from bentwing.errors import UsageError
+    from bentwing.pipeline import map_recording
     from bentwing.progress import create_progress
+    from bentwing.run_settings import settings_text
 
     if print_settings:
-        typer.echo(pipeline.settings_text(estimator, payload))
+        typer.echo(settings_text(estimator, payload))
         return
     if not recording or out is None:
         msg = "a recording and a folder for the results are needed: bentwing map RECORDING -o OUT"
         raise UsageError(msg)
-    pipeline.map_recording(
+    map_recording(
         recording,
         payload,
         out,

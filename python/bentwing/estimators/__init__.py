@@ -12,7 +12,10 @@ if TYPE_CHECKING:
     from bentwing.estimators.interface import Estimator
     from bentwing.recording import Payload
 
-__all__ = ["Continuous", "create"]
+__all__ = ["AVAILABLE_ESTIMATORS", "ESTIMATORS", "Continuous", "create", "require_estimator"]
+
+ESTIMATORS = ("continuous", "kalman", "ndt")
+AVAILABLE_ESTIMATORS = ("continuous",)
 
 
 def create(
@@ -22,7 +25,16 @@ def create(
     threads: int | None = None,
 ) -> Estimator:
     """Return the estimator `name`, or raise UsageError where there is none of that name."""
-    if name == "continuous":
-        return Continuous(payload, settings, threads)
-    msg = f"estimator {name!r} is not known; choose continuous"
-    raise UsageError(msg)
+    require_estimator(name)
+    return Continuous(payload, settings, threads)
+
+
+def require_estimator(name: str) -> None:
+    """Refuse an estimator that does not exist, before anything is read."""
+    choice = " or ".join(AVAILABLE_ESTIMATORS)
+    if name not in ESTIMATORS:
+        msg = f"estimator {name!r} is not known; choose {choice}"
+        raise UsageError(msg)
+    if name not in AVAILABLE_ESTIMATORS:
+        msg = f"the estimator {name!r} is not in this version; use {choice}"
+        raise UsageError(msg)

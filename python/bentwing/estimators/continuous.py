@@ -11,7 +11,9 @@ from bentwing import _core, geometry
 from bentwing.errors import NotEnoughDataError
 from bentwing.estimators.buffer import BatchBuffer
 from bentwing.estimators.core_settings import CoreSettings
+from bentwing.estimators.core_states import core_globals, refined_mount
 from bentwing.estimators.interface import Calibration, Estimate
+from bentwing.estimators.mount import described_mount
 from bentwing.estimators.odometry_pass import DT, MARGIN, OdometryPass
 from bentwing.estimators.settings import ContinuousSettings
 from bentwing.estimators.slow_states import SlowStatePrior, named_std
@@ -35,10 +37,14 @@ class Continuous:
     """
 
     def __init__(
-        self, payload: Payload, settings: ContinuousSettings | None = None, threads: int | None = None
+        self,
+        payload: Payload,
+        settings: ContinuousSettings | None = None,
+        threads: int | None = None,
     ) -> None:
         self.settings = settings or ContinuousSettings()
         self._payload = payload
+        self._mount = described_mount(payload)
         self._threads = threads or 0
         self._sliding = self.settings
         self._core = CoreSettings.of(self.settings.registration, payload, DT)
@@ -62,6 +68,16 @@ class Continuous:
             There is no second of lidar data.
         """
         self._advance(finishing=True)
+        return self.so_far()
+
+    def so_far(self) -> Estimate:
+        """Return what the windows registered so far say.
+
+        Raises
+        ------
+        NotEnoughDataError
+            There is none yet.
+        """
         if self._pass is None or not self._pass.windows:
             msg = f"less than {self._sliding.shift:g} s of lidar points; nothing can be estimated"
             raise NotEnoughDataError(msg)
@@ -112,9 +128,7 @@ class Continuous:
         quat = start.quat_xyzw
         if learned is not None and start.static is not None:
             quat = attitude_of(start.static.accel_mean - slow.accel_bias)
-        samples = _core.Samples(
-            self._first, DT, np.zeros((n, 3)), np.repeat(quat[None], n, axis=0)
-        )
+        samples = _core.Samples(self._first, DT, np.zeros((n, 3)), np.repeat(quat[None], n, axis=0))
         has_imu = self._buffer.has_imu and self._payload.imu is not None
         if learned is None:
             prior = SlowStatePrior(
@@ -133,7 +147,7 @@ class Continuous:
             prior,
             self._sliding,
             self._core,
-            self._threads,
+            threads=self._threads,
             resting=start.static is not None,
         )
         if start.static is not None and self.settings.n_views:
@@ -141,19 +155,14 @@ class Continuous:
         return begun
 
     def _initial_globals(self, start: Start) -> _core.Globals:
-        encoder, gravity = self._payload.encoder, (0.0, 0.0, STANDARD_GRAVITY)
-        biases = {"gyro_bias": tuple(start.gyro_bias), "accel_bias": tuple(start.accel_bias)}
-        if encoder is None:
-            T = self._payload.T_imu_lidar
-            base = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)) if T is None else (T.translation, T.quaternion)
-            return _core.Globals(base, latency=0.0, gravity=gravity, **biases)
-        return _core.Globals(
-            (encoder.T_imu_motor.translation, encoder.T_imu_motor.quaternion),
-            latency=0.0,
-            gravity=gravity,
-            motor_axis=encoder.axis,
-            T_motor_lidar=(encoder.T_motor_lidar.translation, encoder.T_motor_lidar.quaternion),
-            **biases,
+        return core_globals(
+            Calibration(
+                latency=0.0,
+                mount=self._mount,
+                gyro_bias=start.gyro_bias,
+                accel_bias=start.accel_bias,
+                gravity=np.array([0.0, 0.0, STANDARD_GRAVITY]),
+            )
         )
 
     def _learned_globals(self, learned: OdometryPass) -> _core.Globals:
@@ -192,19 +201,20 @@ class Continuous:
         slow = last.globals
         calibration = Calibration(
             latency=slow.latency,
-            T_imu_lidar_translation=slow.base_translation,
-            T_imu_lidar_quat_xyzw=slow.base_quat_xyzw,
+            mount=refined_mount(self._mount, slow),
             gyro_bias=slow.gyro_bias,
             accel_bias=slow.accel_bias,
             gravity=np.array([0.0, 0.0, STANDARD_GRAVITY]),
-            encoder_zero=slow.encoder_zero,
             std=named_std(last.covariance, last.prior.frozen),
         )
         return Estimate(
             trajectory,
             calibration,
             windows=last.windows,
-            counts={"estimate.windows": len(last.windows), "estimate.samples_without_imu": last.n_blind},
+            counts={
+                "estimate.windows": len(last.windows),
+                "estimate.samples_without_imu": last.n_blind,
+            },
             timings=last.timings,
             warnings=_warnings(last),
         )
@@ -217,7 +227,7 @@ def _levelling(gravity: NDArray[np.float64]) -> NDArray[np.float64]:
     sine = float(np.linalg.norm(axis))
     if sine < 1e-12:
         return np.array([0.0, 0.0, 0.0, 1.0])
-    return geometry.exp((axis / sine * np.arctan2(sine, up[2]))[None])[0]
+    return geometry.exp((axis / sine * np.arctan2(sine, up[2]))[None]).reshape(4)
 
 
 def _warnings(last: OdometryPass) -> list[str]:

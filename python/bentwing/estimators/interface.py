@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from bentwing.estimators.mount import Mount
     from bentwing.recording.batches import Batch
     from bentwing.trajectory import Trajectory
 
@@ -21,22 +22,21 @@ class Calibration:
     Attributes
     ----------
     latency : s, lidar stamps minus IMU clock: a lidar stamp t was measured at t - latency
-    T_imu_lidar_translation, T_imu_lidar_quat_xyzw : (3,) m, (4,)
+    mount : where the lidar is, seen from the IMU
     gyro_bias, accel_bias : (3,) rad/s, m/s²
     gravity : (3,) m/s², map frame, pointing up
-    encoder_zero : rad, added to every encoder angle
-    std : standard deviation of each, by the names `latency` (1,), `extrinsic_rotation` (3,) rad,
-        `extrinsic_translation` (3,) m, `gyro_bias` (3,), `accel_bias` (3,), `gravity` (2,) rad,
-        `encoder_zero` (1,) rad, `motor_axis` (2,) rad
+    std : standard deviation of what was estimated, by the names `latency` (1,),
+        `extrinsic_rotation` (3,) rad and `extrinsic_translation` (3,) m of the lidar, or of the
+        motor, in the IMU frame, `gyro_bias` (3,), `accel_bias` (3,), `gravity` (2,) rad, and for
+        a motor `encoder_zero` (1,) rad, and of the lidar across the axis `motor_tilt` (2,) rad and
+        `motor_offset` (2,) m
     """
 
     latency: float
-    T_imu_lidar_translation: NDArray[np.float64]
-    T_imu_lidar_quat_xyzw: NDArray[np.float64]
+    mount: Mount
     gyro_bias: NDArray[np.float64]
     accel_bias: NDArray[np.float64]
     gravity: NDArray[np.float64]
-    encoder_zero: float = 0.0
     std: dict[str, list[float]] = field(default_factory=dict)
 
 
@@ -72,3 +72,6 @@ class Estimator(Protocol):
 
     def result(self) -> Estimate:
         """Finish with what was fed so far."""
+
+    def so_far(self) -> Estimate:
+        """Return what is estimated already, without any further work."""

@@ -42,8 +42,8 @@ class OdometryPass:
         prior: SlowStatePrior,
         settings: ContinuousSettings,
         core: CoreSettings,
-        threads: int,
         *,
+        threads: int,
         resting: bool,
     ) -> None:
         """Begin with `samples`; with `resting` all of them are at rest and never corrected."""
@@ -98,7 +98,7 @@ class OdometryPass:
         """Return times (N,), positions (N, 3) and quaternions (N, 4) of all samples so far."""
         parts = [*self._finished, (self.samples.positions, self.samples.quats_xyzw)]
         positions = np.concatenate([p for p, _ in parts])
-        times = self._origin + DT * np.arange(len(positions))
+        times = self._origin + DT * np.arange(len(positions), dtype=np.float64)
         return times, positions, np.concatenate([q for _, q in parts])
 
     def _imu(self, buffer: BatchBuffer, end: float) -> _core.Imu | None:

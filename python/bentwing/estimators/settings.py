@@ -20,7 +20,9 @@ class SurfelSettings(_Section):
     min_points: int = Field(6, ge=4)
     min_planarity: float = Field(0.3, ge=0, le=1, description="2 (l2 - l1) / (l1 + l2 + l3)")
     min_width_ratio: float = Field(0.03, ge=0, le=1, description="l2 / l3")
-    min_width: float = Field(0.05, ge=0, description="sqrt(l2) in voxels; rejects single scan lines")
+    min_width: float = Field(
+        0.05, ge=0, description="sqrt(l2) in voxels; rejects single scan lines"
+    )
     max_rate: float = Field(4000.0, gt=0, description="most surfels per second of data")
 
 
@@ -53,7 +55,9 @@ class ContinuousSettings(_Section):
         0.2, gt=0, description="new data per step without an IMU, s: how long velocities are extrapolated"
     )
     rehearsal: float = Field(
-        20.0, ge=0, description="seconds after the start that are run twice, for the calibration; 0: never"
+        20.0,
+        ge=0,
+        description="seconds after the start that are run twice, for the calibration; 0: never",
     )
     view_length: float = Field(1.5, gt=0, description="of a fixed view, s")
     view_distance: float = Field(1.5, gt=0, description="motion that renews the fixed views, m")

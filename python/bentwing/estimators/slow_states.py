@@ -45,7 +45,12 @@ INITIAL_STD = {
 }
 MOVING_START_STD = {"gyro_bias": 0.02, "accel_bias": 0.1, "gravity": 0.2}
 # Random walks, per √s.
-WALK = {"latency": 1e-5, "extrinsic_rotation": 1e-6, "extrinsic_translation": 1e-6, "accel_bias": 3e-4}
+WALK = {
+    "latency": 1e-5,
+    "extrinsic_rotation": 1e-6,
+    "extrinsic_translation": 1e-6,
+    "accel_bias": 3e-4,
+}
 
 # Each second is seen in several windows, and the matches of a surface are not independent.
 MATCH_INDEPENDENCE = 0.1
@@ -58,7 +63,9 @@ class SlowStatePrior:
     walk; carrying the information each window gains holds them.
     """
 
-    def __init__(self, imu: Imu | None, *, has_motor: bool, moving: bool, frozen: Iterable[str]) -> None:
+    def __init__(
+        self, imu: Imu | None, *, has_motor: bool, moving: bool, frozen: Iterable[str]
+    ) -> None:
         names = _frozen_names(frozen, has_imu=imu is not None, has_motor=has_motor)
         std = INITIAL_STD | (MOVING_START_STD if moving else {})
         self.frozen = np.zeros(N_STATES, dtype=bool)

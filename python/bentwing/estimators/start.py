@@ -70,4 +70,4 @@ def find_start(imu: ImuBatch, noise: Imu) -> Start:
 
 def attitude_of(force: NDArray[np.float64]) -> NDArray[np.float64]:
     """Quaternion (4,) of the attitude, yaw zero, in which `force` (3,) in the IMU frame is up."""
-    return geometry.from_matrices(level_attitude(force)[None])[0]
+    return geometry.from_matrices(level_attitude(force)[None]).reshape(4)

@@ -47,7 +47,10 @@ class FixedViews:
         if not left or self._settings.n_views == 0 or start < samples.start:
             return
         place = samples.position_at(window_start)
-        moved = self._place is None or np.linalg.norm(place - self._place) >= self._settings.view_distance
+        moved = (
+            self._place is None
+            or np.linalg.norm(place - self._place) >= self._settings.view_distance
+        )
         n_left = sum(int(((s.stamps >= start) & (s.stamps < window_start)).sum()) for s in left)
         poorest = min((len(v) for v in self.views), default=0)
         if not moved and n_left < RICHER * poorest:

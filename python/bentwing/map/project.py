@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from bentwing import geometry
+from bentwing.estimators.core_states import core_globals, core_samples
+from bentwing.estimators.mount import MotorMount
 from bentwing.map.chunk import MapChunk
 from bentwing.recording.batches import LidarBatch
 
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
 
     from bentwing.estimators.interface import Calibration
     from bentwing.recording.batches import Batch
-    from bentwing.recording.payload import Encoder, Transform
     from bentwing.trajectory import Trajectory
 
 _Scalar = TypeVar("_Scalar", bound=np.generic)
@@ -32,17 +32,17 @@ def project(
     trajectory: Trajectory,
     calibration: Calibration,
     *,
-    encoder: Encoder | None = None,
+    threads: int | None = None,
     counts: dict[str, int] | None = None,
 ) -> Iterator[MapChunk]:
-    """Put every return where it was measured.
+    """Put every return where it was measured (Kaul 2015, eq. 1 and 2).
 
     Parameters
     ----------
     batches : stream of the recording; what is not lidar is passed over
-    trajectory : poses of the IMU in the map
-    calibration : latency, `T_imu_lidar` and encoder zero of the estimate
-    encoder : of a motor-turned lidar; its mount then stands in for `T_imu_lidar`
+    trajectory : poses of the IMU in the map, at a uniform rate
+    calibration : latency and mount of the lidar
+    threads : default: all cores
     counts : receives `map.points`, `map.outside_trajectory` and `map.not_finite`
 
     Yields
@@ -52,48 +52,35 @@ def project(
     counts = {} if counts is None else counts
     for name in ("map.points", "map.outside_trajectory", "map.not_finite"):
         counts.setdefault(name, 0)
+    samples, slow = core_samples(trajectory), core_globals(calibration)
+    turned = isinstance(calibration.mount, MotorMount)
     for batch in _gathered(batches):
-        times = batch.times - calibration.latency
-        covered = trajectory.covers(times)
-        finite = np.isfinite(batch.points).all(axis=1)
-        counts["map.outside_trajectory"] += int(np.count_nonzero(~covered))
-        counts["map.not_finite"] += int(np.count_nonzero(covered & ~finite))
-        keep = covered & finite
-        if not keep.all():
-            batch, times = batch.where(keep), times[keep]
-        counts["map.points"] += len(times)
-        if len(times):
+        if turned and batch.angles is None:
+            msg = "batch.angles: expected the motor's angle of every return, got None"
+            raise ValueError(msg)
+        batch = _placeable(batch, trajectory, calibration, counts)
+        if len(batch.times):
+            angles = batch.angles if turned else None
             yield MapChunk(
-                trajectory.transform_points(to_imu(batch, calibration, encoder), times),
-                times,
+                samples.place(batch.points, batch.times, angles, slow, threads=threads or 0),
+                batch.times - calibration.latency,
                 np.linalg.norm(batch.points, axis=1).astype(np.float32),
                 batch.intensity,
                 batch.ring,
             )
 
 
-def to_imu(
-    batch: LidarBatch, calibration: Calibration, encoder: Encoder | None
-) -> NDArray[np.float64]:
-    """Coordinates in the IMU frame, `(N, 3)` m, at the time of each return.
-
-    With an encoder the lidar's pose is `T_imu_motor · Rot(axis, θ + zero) · T_motor_lidar`.
-    """
-    if encoder is None:
-        return geometry.compose(
-            calibration.T_imu_lidar_translation, calibration.T_imu_lidar_quat_xyzw, batch.points
-        )
-    if batch.angles is None:
-        msg = "batch.angles: expected the motor's angle of every return, got None"
-        raise ValueError(msg)
-    points = geometry.compose(*_pose(encoder.T_motor_lidar), batch.points)
-    angles = batch.angles + calibration.encoder_zero
-    points = geometry.rotate(geometry.exp(angles[:, None] * np.array(encoder.axis)), points)
-    return geometry.compose(*_pose(encoder.T_imu_motor), points)
-
-
-def _pose(transform: Transform) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    return np.array(transform.translation), np.array(transform.quaternion)
+def _placeable(
+    batch: LidarBatch, trajectory: Trajectory, calibration: Calibration, counts: dict[str, int]
+) -> LidarBatch:
+    """Leave out, and count, what the trajectory does not cover or is not finite."""
+    covered = trajectory.covers(batch.times - calibration.latency)
+    finite = np.isfinite(batch.points).all(axis=1)
+    counts["map.outside_trajectory"] += int(np.count_nonzero(~covered))
+    counts["map.not_finite"] += int(np.count_nonzero(covered & ~finite))
+    keep = covered & finite
+    counts["map.points"] += int(np.count_nonzero(keep))
+    return batch if keep.all() else batch.where(keep)
 
 
 def _gathered(batches: Iterable[Batch]) -> Iterator[LidarBatch]:

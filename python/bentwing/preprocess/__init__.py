@@ -1,61 +1,8 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""From the recording's batches to batches an estimator can use: filtered, with encoder angles."""
+"""From the recording's batches to batches an estimator can use, and the start of the estimate."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
-from bentwing.preprocess.encoder import EncoderAngles
-from bentwing.preprocess.ranges import within_range
-from bentwing.preprocess.self_hits import outside_boxes
+from bentwing.preprocess.chain import preprocess
+from bentwing.preprocess.part import RecordingPart
 from bentwing.preprocess.static_init import StaticStart, find_static_start
-from bentwing.recording.batches import EncoderBatch, LidarBatch
 
-if TYPE_CHECKING:
-    from collections import Counter
-    from collections.abc import Iterable, Iterator
-
-    from bentwing.recording.batches import Batch
-    from bentwing.recording.payload import Payload
-
-__all__ = ["StaticStart", "find_static_start", "preprocess"]
-
-
-def preprocess(batches: Iterable[Batch], payload: Payload, counts: Counter[str]) -> Iterator[Batch]:
-    """Filter lidar returns by range and self-hits, and attach the encoder's angles.
-
-    Parameters
-    ----------
-    batches : in the order of the recording
-    payload : ranges, self-hit boxes, and whether there is an encoder
-    counts : receives `preprocess.range`, `preprocess.self_hits`, `preprocess.no_encoder_angle`,
-        the points dropped for each reason
-
-    Yields
-    ------
-    Batch
-        IMU and encoder batches as they came; lidar batches without the dropped points, with an
-        encoder as soon as its angles reach beyond them.
-    """
-    encoder = None if payload.encoder is None else EncoderAngles(counts)
-    for batch in batches:
-        if isinstance(batch, LidarBatch):
-            kept = _filtered(batch, payload, counts)
-            if len(kept.times) == 0:
-                continue
-            yield from [kept] if encoder is None else encoder.add_lidar(kept)
-            continue
-        yield batch
-        if isinstance(batch, EncoderBatch) and encoder is not None:
-            yield from encoder.add_encoder(batch)
-    if encoder is not None:
-        yield from encoder.finish()
-
-
-def _filtered(batch: LidarBatch, payload: Payload, counts: Counter[str]) -> LidarBatch:
-    near = within_range(batch.points, payload.lidar.min_range, payload.lidar.max_range)
-    outside = outside_boxes(batch.points, payload.self_hits)
-    counts["preprocess.range"] += int((~near).sum())
-    counts["preprocess.self_hits"] += int((near & ~outside).sum())
-    keep = near & outside
-    return batch if keep.all() else batch.where(keep)
+__all__ = ["RecordingPart", "StaticStart", "find_static_start", "preprocess"]

@@ -18,7 +18,7 @@ from bentwing.recording.topics import LASER_SCAN, LIVOX, MULTI_ECHO, POINT_CLOUD
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from bentwing.recording.clock import Clock
+    from bentwing.clock import Clock
     from bentwing.recording.point_times import TimeReading
     from bentwing.recording.streams import RawMessage
     from bentwing.recording.wire_clouds import RawLivox

@@ -7,9 +7,9 @@ from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from bentwing.clock import NS_PER_S, Clock
 from bentwing.errors import PayloadError, RecordingError
 from bentwing.recording import imu_units, problems
-from bentwing.recording.clock import NS_PER_S, Clock
 from bentwing.recording.lidar_stream import LidarStream
 from bentwing.recording.payload import Payload
 from bentwing.recording.peek import Peek, peek

@@ -15,8 +15,8 @@ from bentwing.recording.stamps import StampMonitor
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from bentwing.clock import Clock
     from bentwing.recording.batches import Batch
-    from bentwing.recording.clock import Clock
 
 RawMessage = tuple[int, bytes]  # recorder's time in ns, bytes
 MAX_ENCODER_ANGLE = 1e6  # rad; more is damage

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
 """The report: what a run found, as one page that opens anywhere."""
 
+from bentwing.report.of_run import report_run
 from bentwing.report.page import write_report
 
-__all__ = ["write_report"]
+__all__ = ["report_run", "write_report"]

@@ -14,40 +14,52 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
 
+DEGREES = 180 / np.pi
+
+
 def calibration_table(calibration: Mapping[str, Any] | None) -> str:
     """Make the table of latency, extrinsics and biases with their standard deviations."""
     if not calibration:
         return '<p class="none">Not recorded.</p>'
     std = calibration.get("std") or {}
-    rotation = geometry.log(np.array(calibration["T_imu_lidar_quat_xyzw"], float))
-    degrees = 180 / np.pi
     rows = [
         _row("lidar latency, ms", [calibration["latency"]], std.get("latency"), 1e3, 3),
-        _row(
-            "lidar in IMU, mm (x, y, z)",
-            calibration["T_imu_lidar_translation"],
-            std.get("extrinsic_translation"),
-            1e3,
-            1,
-        ),
-        _row(
-            "lidar in IMU, rotation vector, °",
-            rotation.tolist(),
-            std.get("extrinsic_rotation"),
-            degrees,
-            3,
-        ),
-        _row("gyro bias, °/s", calibration["gyro_bias"], std.get("gyro_bias"), degrees, 4),
+        *_mount_rows(calibration["mount"], std),
+        _row("gyro bias, °/s", calibration["gyro_bias"], std.get("gyro_bias"), DEGREES, 4),
         _row("accelerometer bias, m/s²", calibration["accel_bias"], std.get("accel_bias"), 1.0, 4),
         _row("gravity in the map, m/s²", calibration["gravity"], None, 1.0, 4),
     ]
     if std.get("gravity"):
-        rows.append(_row("direction of gravity, °", [0.0, 0.0], std["gravity"], degrees, 3))
-    if "encoder_zero" in std:
-        zero = [calibration.get("encoder_zero", 0.0)]
-        rows.append(_row("encoder zero, °", zero, std["encoder_zero"], degrees, 3))
+        rows.append(_row("direction of gravity, °", [0.0, 0.0], std["gravity"], DEGREES, 3))
     head = ("quantity", "estimate", "standard deviation")
     return table(head, rows, numbers=frozenset({1, 2}))
+
+
+def _mount_rows(mount: Mapping[str, Any], std: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+    base_std = std.get("extrinsic_translation"), std.get("extrinsic_rotation")
+    if "T_imu_lidar" in mount:
+        return _pose_rows("lidar in IMU", mount["T_imu_lidar"], *base_std)
+    zero = [mount["encoder_zero"]]
+    return [
+        *_pose_rows("motor in IMU", mount["T_imu_motor"], *base_std),
+        _row("encoder zero, °", zero, std.get("encoder_zero"), DEGREES, 3),
+        *_pose_rows(
+            "lidar in motor", mount["T_motor_lidar"], std.get("motor_offset"), std.get("motor_tilt")
+        ),
+    ]
+
+
+def _pose_rows(
+    name: str,
+    pose: Mapping[str, Any],
+    translation_std: Sequence[float] | None,
+    rotation_std: Sequence[float] | None,
+) -> list[tuple[str, str, str]]:
+    rotation = geometry.log(np.array(pose["quat_xyzw"], float)).tolist()
+    return [
+        _row(f"{name}, mm (x, y, z)", pose["translation"], translation_std, 1e3, 1),
+        _row(f"{name}, rotation vector, °", rotation, rotation_std, DEGREES, 3),
+    ]
 
 
 def _row(

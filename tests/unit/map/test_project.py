@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
 from bentwing import geometry
 from bentwing.estimators.interface import Calibration
+from bentwing.estimators.mount import FixedMount, MotorMount, Pose
 from bentwing.map import project as room
 from bentwing.map.project import project
 from bentwing.recording.batches import ImuBatch, LidarBatch
@@ -15,13 +14,13 @@ TARGET = np.array([4.0, 1.0, -0.5])
 R_IMU_LIDAR = geometry.exp(np.array([0.1, -0.4, 0.9]))
 T_IMU_LIDAR = np.array([0.03, 0.0, -0.05])
 LATENCY = 0.004
+PLACED_WITHIN = 1e-6  # m, at these rates of turn
 
 
 def calibration(**changes):
     values = {
         "latency": LATENCY,
-        "T_imu_lidar_translation": T_IMU_LIDAR,
-        "T_imu_lidar_quat_xyzw": R_IMU_LIDAR,
+        "mount": FixedMount(Pose(T_IMU_LIDAR, R_IMU_LIDAR)),
         "gyro_bias": np.zeros(3),
         "accel_bias": np.zeros(3),
         "gravity": np.array([0, 0, 9.81]),
@@ -51,7 +50,9 @@ def test_a_fixed_target_seen_while_turning_is_mapped_to_one_place():
         LidarBatch(p, t) for p, t in zip(np.split(points, 10), np.split(stamps, 10), strict=True)
     ]
     chunks = list(project(batches, trajectory(), calibration()))
-    assert np.allclose(np.concatenate([c.points for c in chunks]), TARGET, atol=1e-9)
+    assert np.allclose(
+        np.concatenate([c.points for c in chunks]), TARGET, rtol=0, atol=PLACED_WITHIN
+    )
     assert np.allclose(np.concatenate([c.times for c in chunks]), stamps - LATENCY)
     assert np.allclose(
         np.concatenate([c.ranges for c in chunks]), np.linalg.norm(points, axis=1), rtol=1e-6
@@ -61,24 +62,32 @@ def test_a_fixed_target_seen_while_turning_is_mapped_to_one_place():
 def test_a_motor_turned_lidar_goes_through_mount_axis_and_zero():
     stamps, zero = np.linspace(0.1, 0.9, 400), 0.03
     axis = np.array([0.0, 0.6, 0.8])
-    mount = SimpleNamespace(translation=(0.1, 0.0, 0.2), quaternion=tuple(R_IMU_LIDAR))
-    lever = SimpleNamespace(
-        translation=(0.0, 0.02, 0.0), quaternion=tuple(geometry.exp(np.array([0, 0.2, 0])))
-    )
-    encoder = SimpleNamespace(axis=tuple(axis), T_imu_motor=mount, T_motor_lidar=lever)
+    motor = Pose(np.array([0.1, 0.0, 0.2]), R_IMU_LIDAR)
+    lever = Pose(np.array([0.0, 0.02, 0.0]), geometry.exp(np.array([0, 0.2, 0])))
     angles = 7.0 * stamps
-    points = undone(np.array(mount.translation), np.array(mount.quaternion), seen_in_imu(stamps))
+    points = undone(motor.translation, motor.quat_xyzw, seen_in_imu(stamps))
     points = geometry.rotate(geometry.exp(-(angles + zero)[:, None] * axis), points)
-    points = undone(np.array(lever.translation), np.array(lever.quaternion), points)
+    points = undone(lever.translation, lever.quat_xyzw, points)
     batch = LidarBatch(points, stamps, angles=angles)
-    (chunk,) = project([batch], trajectory(), calibration(encoder_zero=zero), encoder=encoder)
-    assert np.allclose(chunk.points, TARGET, atol=1e-9)
+    mount = MotorMount(motor, axis, zero, lever)
+    (chunk,) = project([batch], trajectory(), calibration(mount=mount))
+    assert np.allclose(chunk.points, TARGET, rtol=0, atol=PLACED_WITHIN)
 
 
-def test_an_encoder_without_angles_is_refused():
+def test_a_motor_without_angles_is_refused():
     batch = LidarBatch(np.ones((1, 3)), np.array([0.5]))
+    pose = Pose(np.zeros(3), R_IMU_LIDAR)
+    mount = MotorMount(pose, np.array([0, 0, 1.0]), 0.0, pose)
     with pytest.raises(ValueError, match="angle of every return"):
-        list(project([batch], trajectory(), calibration(), encoder=SimpleNamespace()))
+        list(project([batch], trajectory(), calibration(mount=mount)))
+
+
+def test_a_trajectory_with_a_missing_pose_is_refused():
+    whole = trajectory()
+    kept = np.arange(101) != 40
+    gapped = Trajectory(whole.times[kept], whole.positions[kept], whole.quats_xyzw[kept])
+    with pytest.raises(ValueError, match="resample"):
+        list(project([], gapped, calibration()))
 
 
 def test_what_cannot_be_placed_is_dropped_and_counted():

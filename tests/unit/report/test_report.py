@@ -9,6 +9,7 @@ import pytest
 
 from bentwing import geometry
 from bentwing.report import write_report
+from bentwing.report.calibration import calibration_table
 from bentwing.trajectory import Trajectory
 
 RECORD = {
@@ -25,13 +26,11 @@ RECORD = {
     "peak_memory_mb": 512.0,
     "calibration": {
         "latency": 0.00213,
-        "T_imu_lidar_translation": [0.0312, 0.0, -0.05],
-        "T_imu_lidar_quat_xyzw": [0.0, 0.0, 0.0, 1.0],
+        "mount": {"T_imu_lidar": {"translation": [0.0312, 0, -0.05], "quat_xyzw": [0, 0, 0, 1]}},
         "gyro_bias": [0.001, 0.0, 0.0],
         "accel_bias": [0.02, 0.0, 0.0],
         "gravity": [0.0, 0.0, 9.81],
-        "encoder_zero": 0.01,
-        "std": {"latency": [2e-5], "extrinsic_translation": [4e-4] * 3, "encoder_zero": [1e-4]},
+        "std": {"latency": [2e-5], "extrinsic_translation": [4e-4] * 3},
     },
     "windows": [
         {"time": float(t), "n_matches": 100 + t, "n_fixed_matches": 50, "inlier_share": 0.9,
@@ -122,11 +121,19 @@ def test_numbers_appear_with_their_deviations(whole_page):
         "31.2",
         "± 0.4",
         "12 M",
-        "0.573",
         "0.5 GB",
         "2.0 \N{MULTIPLICATION SIGN}",
     ):
         assert number in text, number
+
+
+def test_a_motor_mount_is_shown_with_its_three_parts():
+    pose = {"translation": [0.01, 0.0, 0.05], "quat_xyzw": [0.0, 0.0, 0.0, 1.0]}
+    mount = {"T_imu_motor": pose, "axis": [0, 0, 1], "encoder_zero": 0.01, "T_motor_lidar": pose}
+    std = {"encoder_zero": [1e-4], "motor_tilt": [2e-4, 3e-4], "motor_offset": [1e-3, 2e-3]}
+    html = calibration_table({**RECORD["calibration"], "mount": mount, "std": std})
+    for text in ("motor in IMU", "encoder zero", "0.573", "± 0.006", "lidar in motor", "± 2.0"):
+        assert text in html, text
 
 
 def test_no_drawing_library_is_loaded(tmp_path, monkeypatch):

@@ -92,7 +92,7 @@ mod tests {
         /// The model is eq. 3: the correction at the surfel's own time turns its lever and moves it.
         #[test]
         fn the_jacobian_agrees_with_central_differences(scene in Scene::any(), i in 0..8_usize) {
-            let set = scene.surfels();
+            let set = Scene::surfels();
             let spline = scene.spline();
             let mut surfel = place(&set, i, &scene.trajectory, &scene.globals);
             surfel.basis = spline.basis(surfel.time);

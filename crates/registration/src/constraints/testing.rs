@@ -95,7 +95,7 @@ impl Scene {
 
     /// Eight surfels; their times lie inside an interval of the trajectory, where the
     /// interpolation is differentiable.
-    pub fn surfels(&self) -> SurfelSet {
+    pub fn surfels() -> SurfelSet {
         let f = f64::from;
         SurfelSet {
             means: (0..8)

@@ -4,7 +4,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bentwing.recording.clock import Clock, format_ns
+from bentwing.clock import Clock, format_ns
 
 START_NS = 1_700_000_000_123_456_789
 

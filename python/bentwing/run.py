@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""What a run has found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bentwing.map.sample import MapSample
+from bentwing.recording import ImuBatch
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from bentwing.estimators.interface import Estimate
+    from bentwing.recording import Batch
+
+
+@dataclass(slots=True)
+class Run:
+    """What a run has found so far; complete when `map_recording` returns.
+
+    Attributes
+    ----------
+    out : the run folder
+    estimate : trajectory, calibration and diagnostics; None before there are any
+    sample : evenly chosen points of the map
+    spin_times, spin_rates : s and rad/s, rate of turn of the IMU, about ten a second
+    """
+
+    out: Path
+    estimate: Estimate | None = None
+    sample: MapSample = field(default_factory=MapSample)
+    spin_times: list[float] = field(default_factory=list)
+    spin_rates: list[float] = field(default_factory=list)
+
+    def watch(self, batch: Batch) -> None:
+        """Note the rate of turn of an IMU batch."""
+        if isinstance(batch, ImuBatch) and len(batch.times):
+            self.spin_times.append(float(batch.times.mean()))
+            self.spin_rates.append(float(np.median(np.linalg.norm(batch.gyro, axis=1))))

@@ -89,6 +89,24 @@ pub(crate) fn times<'a>(
     }
 }
 
+/// A finite number.
+pub(crate) fn finite_number(name: &str, value: f64) -> PyResult<f64> {
+    if value.is_finite() {
+        return Ok(value);
+    }
+    let message = format!("{name}: expected a finite number, got {value}");
+    Err(PyValueError::new_err(message))
+}
+
+/// A finite three-vector.
+pub(crate) fn finite_vector(name: &str, value: [f64; 3]) -> PyResult<Vector3<f64>> {
+    if value.iter().all(|v| v.is_finite()) {
+        return Ok(value.into());
+    }
+    let message = format!("{name}: expected finite numbers, got {value:?}");
+    Err(PyValueError::new_err(message))
+}
+
 /// Three-vectors of the rows.
 pub(crate) fn vectors(rows: &[[f64; 3]]) -> Vec<Vector3<f64>> {
     rows.iter().map(|r| Vector3::from(*r)).collect()
@@ -97,7 +115,9 @@ pub(crate) fn vectors(rows: &[[f64; 3]]) -> Vec<Vector3<f64>> {
 /// A unit quaternion from x, y, z, w; refuses norms that are not one.
 pub(crate) fn unit_quaternion(name: &str, q: &[f64; 4]) -> PyResult<UnitQuaternion<f64>> {
     let q = Quaternion::new(q[3], q[0], q[1], q[2]);
-    if (q.norm() - 1.0).abs() > 1e-3 {
+    // Written so that NaN, which compares with nothing, is refused as well.
+    let is_unit = (q.norm() - 1.0).abs() <= 1e-3;
+    if !is_unit {
         let message = format!("{name}: expected a unit quaternion, got norm {}", q.norm());
         return Err(PyValueError::new_err(message));
     }

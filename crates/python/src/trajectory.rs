@@ -10,7 +10,9 @@ use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, ToPyArray};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::arrays::{finite_rows, times, to_array2, unit_quaternion, vectors};
+use crate::arrays::{
+    finite_number, finite_rows, finite_vector, times, to_array2, unit_quaternion, vectors,
+};
 use crate::errors::in_pool;
 
 /// Poses of the IMU in the map at a uniform rate.
@@ -196,10 +198,8 @@ struct Transform([f64; 3], [f64; 4]);
 impl Transform {
     fn isometry(&self, name: &str) -> PyResult<Isometry3<f64>> {
         let q = unit_quaternion(name, &self.1)?;
-        Ok(Isometry3::from_parts(
-            Translation3::from(Vector3::from(self.0)),
-            q,
-        ))
+        let t = finite_vector(name, self.0)?;
+        Ok(Isometry3::from_parts(Translation3::from(t), q))
     }
 }
 
@@ -224,11 +224,11 @@ impl Globals {
         let motor = match (motor_axis, T_motor_lidar) {
             (None, None) => None,
             (Some(axis), Some(T)) => {
-                let axis = Vector3::from(axis).try_normalize(1e-9);
+                let axis = finite_vector("motor_axis", axis)?.try_normalize(1e-9);
                 let zero_axis = || PyValueError::new_err("motor_axis: expected a non-zero vector");
                 Some(Motor {
                     axis: axis.ok_or_else(zero_axis)?,
-                    zero: encoder_zero,
+                    zero: finite_number("encoder_zero", encoder_zero)?,
                     T_motor_lidar: T.isometry("T_motor_lidar")?,
                 })
             }
@@ -239,14 +239,14 @@ impl Globals {
         };
         let head = Head {
             T_imu_base: T_imu_base.isometry("T_imu_base")?,
-            latency,
+            latency: finite_number("latency", latency)?,
             motor,
         };
         Ok(Self(RustGlobals {
             head,
-            gyro_bias: gyro_bias.into(),
-            accel_bias: accel_bias.into(),
-            gravity: gravity.into(),
+            gyro_bias: finite_vector("gyro_bias", gyro_bias)?,
+            accel_bias: finite_vector("accel_bias", accel_bias)?,
+            gravity: finite_vector("gravity", gravity)?,
         }))
     }
 

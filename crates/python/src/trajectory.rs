@@ -34,6 +34,7 @@ impl Samples {
             .iter()
             .map(|q| unit_quaternion("quats_xyzw", q))
             .collect();
+        let start = finite_number("start", start)?;
         Trajectory::new(start, dt, positions, rotations?)
             .map(Self)
             .map_err(|e| PyValueError::new_err(e.to_string()))
@@ -95,14 +96,23 @@ impl Samples {
     }
 
     /// Position (3,), m, at `time`.
-    fn position_at<'py>(&self, py: Python<'py>, time: f64) -> Bound<'py, PyArray1<f64>> {
-        vector(py, &self.0.pose(time).p)
+    fn position_at<'py>(&self, py: Python<'py>, time: f64) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let time = finite_number("time", time)?;
+        Ok(vector(py, &self.0.pose(time).p))
     }
 
     /// These samples with those from `first` on replaced by `newer`.
     fn replaced(&self, first: usize, newer: &Self) -> PyResult<Self> {
         if first > self.0.len() {
             let message = format!("first: expected at most {}, got {first}", self.0.len());
+            return Err(PyValueError::new_err(message));
+        }
+        if newer.0.dt() != self.0.dt() {
+            let message = format!(
+                "newer: expected samples every {} s as here, got {} s",
+                self.0.dt(),
+                newer.0.dt()
+            );
             return Err(PyValueError::new_err(message));
         }
         let positions = [&self.0.positions()[..first], newer.0.positions()].concat();
@@ -114,7 +124,13 @@ impl Samples {
 
     /// These samples extended to `until` by the IMU, or at constant velocity without one; and the
     /// number of samples for which the IMU had a gap.
-    fn extended(&self, imu: Option<&Imu>, globals: &Globals, until: f64) -> (Self, usize) {
+    fn extended(
+        &self,
+        imu: Option<&Imu>,
+        globals: &Globals,
+        until: f64,
+    ) -> PyResult<(Self, usize)> {
+        let until = finite_number("until", until)?;
         let mut trajectory = self.0.clone();
         let n_blind = match imu {
             None => {
@@ -133,7 +149,7 @@ impl Samples {
                 )
             }
         };
-        (Self(trajectory), n_blind)
+        Ok((Self(trajectory), n_blind))
     }
 
     /// Lidar points (N, 3) placed in the map.

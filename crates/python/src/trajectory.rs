@@ -191,7 +191,7 @@ impl Imu {
     ) -> PyResult<Self> {
         let gyro = vectors(finite_rows("gyro", &gyro)?);
         let accel = vectors(finite_rows("accel", &accel)?);
-        let stamps = times("times", &stamps, gyro.len())?.to_vec();
+        let stamps = times("stamps", &stamps, gyro.len())?.to_vec();
         if accel.len() != gyro.len() {
             let message = format!("accel: expected {} rows, got {}", gyro.len(), accel.len());
             return Err(PyValueError::new_err(message));

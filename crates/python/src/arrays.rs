@@ -68,6 +68,21 @@ pub(crate) fn finite<'a>(
     }
 }
 
+/// Encoder angles of the points: needed with a motor, without meaning and optional without one.
+pub(crate) fn angles<'a>(
+    array: Option<&'a PyReadonlyArray1<'_, f64>>,
+    n: usize,
+    has_motor: bool,
+) -> PyResult<&'a [f64]> {
+    match array {
+        Some(array) => finite("angles", array, n),
+        None if has_motor && n > 0 => Err(PyValueError::new_err(
+            "angles: expected the motor's angle of every point, as globals have a motor, got None",
+        )),
+        None => Ok(&[]),
+    }
+}
+
 /// As [`finite`], and non-decreasing.
 pub(crate) fn times<'a>(
     name: &str,

@@ -11,7 +11,7 @@ use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, ToPyArray};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::arrays::{finite, finite_rows, times, to_array2};
+use crate::arrays::{angles as angles_of, finite_rows, times, to_array2};
 use crate::errors::{in_pool, solve_error};
 use crate::trajectory::{Globals, Imu, Samples};
 
@@ -145,10 +145,8 @@ pub(crate) fn extract_surfels(
 ) -> PyResult<Surfels> {
     let points = finite_rows("points", &points)?;
     let stamps = times("stamps", &stamps, points.len())?;
-    let angles = match &angles {
-        Some(a) => finite("angles", a, points.len())?,
-        None => &[],
-    };
+    let has_motor = globals.0.head.motor.is_some();
+    let angles = angles_of(angles.as_ref(), points.len(), has_motor)?;
     let settings = bentwing_surfels::Settings {
         voxel_size: settings.voxel_size,
         n_levels: settings.n_levels,

@@ -165,11 +165,8 @@ impl Samples {
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let points = finite_rows("points", &points)?;
         let stamps = times("stamps", &stamps, points.len())?;
-        let angles = match &angles {
-            Some(a) => crate::arrays::finite("angles", a, points.len())?,
-            None => &[],
-        };
         let head = &globals.0.head;
+        let angles = crate::arrays::angles(angles.as_ref(), points.len(), head.motor.is_some())?;
         let placed = in_pool(py, threads, || {
             bentwing_surfels::place_points(points, stamps, angles, &self.0, head)
         })?;

@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, field_validator
+
+from bentwing.estimators.slow_states import SLICES
 
 
 class _Section(BaseModel):
@@ -58,3 +60,12 @@ class ContinuousSettings(_Section):
     )
     surfels: SurfelSettings = SurfelSettings()
     registration: RegistrationSettings = RegistrationSettings()
+
+    @field_validator("frozen")
+    @classmethod
+    def _known_states(cls, names: tuple[str, ...]) -> tuple[str, ...]:
+        unknown = sorted(set(names) - SLICES.keys())
+        if unknown:
+            msg = f"unknown states {unknown}; choose from {list(SLICES)}"
+            raise ValueError(msg)
+        return names

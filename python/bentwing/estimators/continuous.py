@@ -63,10 +63,11 @@ class Continuous:
             There is no second of lidar data.
         """
         self._advance(finishing=True)
-        if self._pass is None or not self._pass.windows:
+        done = self._pass
+        if done is None or not done.windows or done.end - self._first < self.settings.shift:
             msg = f"less than {self.settings.shift:g} s of lidar points; nothing can be estimated"
             raise NotEnoughDataError(msg)
-        return self._estimate(self._pass)
+        return self._estimate(done)
 
     def _advance(self, *, finishing: bool) -> None:
         ready = self._ready_until(finishing=finishing)

@@ -6,7 +6,7 @@ from __future__ import annotations
 import json
 from collections import Counter
 from dataclasses import asdict, dataclass
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import laspy
 import numpy as np
@@ -21,6 +21,9 @@ from bentwing.map.gps_time import adjusted_gps_origin
 from bentwing.preprocess import preprocess
 from bentwing.recording import LidarBatch, Payload, Recording
 from bentwing.trajectory import Trajectory, read_tum
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 MOVED = 0.1  # m from the first place: in flight
 MAP_SAMPLE = 100_000  # points whose distances are measured

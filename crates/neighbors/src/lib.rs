@@ -7,5 +7,5 @@ mod mutual;
 mod search;
 
 pub use grid::Grid;
-pub use mutual::mutual_pairs;
+pub use mutual::{claimed_pairs, mutual_pairs};
 pub use search::{NONE, Neighbors, Search};

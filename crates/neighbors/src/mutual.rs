@@ -3,18 +3,44 @@
 
 use crate::Neighbors;
 
-/// Pairs `(a, b)` with `b` in the list of `a` (`forward`) and `a` in the list of `b` (`backward`),
+/// Pairs `(a, b)`, `a < b`, of a set searched in itself in which each is in the list of the other,
 /// ordered by `a`, then by distance.
-pub fn mutual_pairs<'a>(
-    forward: &'a Neighbors,
-    backward: &'a Neighbors,
-) -> impl Iterator<Item = (u32, u32)> + 'a {
-    (0u32..).take(forward.len()).flat_map(move |a| {
-        let found = forward.of(a as usize).iter().copied();
+pub fn mutual_pairs(nearest: &Neighbors) -> impl Iterator<Item = (u32, u32)> + '_ {
+    (0u32..).take(nearest.len()).flat_map(move |a| {
+        let found = nearest
+            .of(a as usize)
+            .iter()
+            .copied()
+            .filter(move |&b| a < b);
         found
-            .filter(move |&b| backward.of(b as usize).contains(&a))
+            .filter(move |&b| nearest.of(b as usize).contains(&a))
             .map(move |b| (a, b))
     })
+}
+
+/// Pairs `(query, target)` of a set searched in another: of the queries that list a target it
+/// keeps the nearest ones, as many as a list is long; ordered by query, then by distance.
+///
+/// Unlike a search in both directions this costs no second search, and a target is not lost to a
+/// query that prefers another target.
+pub fn claimed_pairs(nearest: &Neighbors, n_targets: usize) -> Vec<(u32, u32)> {
+    let mut claims: Vec<Vec<(f32, u32)>> = vec![Vec::new(); n_targets];
+    for query in 0..nearest.len() {
+        for (target, distance) in nearest.with_distances(query) {
+            let kept = &mut claims[target as usize];
+            let at = kept.partition_point(|&c| c < (distance, query as u32));
+            kept.insert(at, (distance, query as u32));
+            kept.truncate(nearest.k());
+        }
+    }
+    let of_query = |query: u32| {
+        let listed = nearest.of(query as usize).iter().copied();
+        let claims = &claims;
+        listed
+            .filter(move |&t| claims[t as usize].iter().any(|&(_, q)| q == query))
+            .map(move |t| (query, t))
+    };
+    (0u32..).take(nearest.len()).flat_map(of_query).collect()
 }
 
 #[cfg(test)]
@@ -33,7 +59,22 @@ mod tests {
             min_time_gap: 0.3,
         };
         let nearest = grid.nearest(&grid, &search);
-        let pairs: Vec<_> = mutual_pairs(&nearest, &nearest).collect();
-        assert_eq!(pairs, [(1, 2), (2, 1)]);
+        let pairs: Vec<_> = mutual_pairs(&nearest).collect();
+        assert_eq!(pairs, [(1, 2)]);
+    }
+
+    #[test]
+    fn a_target_keeps_only_its_nearest_claims() {
+        let queries = [[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.3, 0.0, 0.0]];
+        let normals = [[0.0, 0.0, 1.0]; 3];
+        let queries = Grid::new(&queries, &normals, &[5.0; 3], 1.0);
+        let target = Grid::new(&[[0.12, 0.0, 0.0]], &normals[..1], &[0.0], 1.0);
+        let search = Search {
+            k: 2,
+            max_distance: 1.0,
+            min_time_gap: 0.3,
+        };
+        let pairs = claimed_pairs(&target.nearest(&queries, &search), 1);
+        assert_eq!(pairs, [(0, 0), (1, 0)]);
     }
 }

@@ -3,6 +3,7 @@
 
 use std::ops::Range;
 
+use pulp::Arch;
 use rayon::prelude::*;
 
 use crate::Grid;
@@ -32,6 +33,8 @@ pub struct Search {
 pub struct Neighbors {
     k: usize,
     indices: Vec<u32>,
+    /// Squared distances; infinite where a place is empty.
+    distances: Vec<f32>,
 }
 
 impl Neighbors {
@@ -40,6 +43,20 @@ impl Neighbors {
         let list = &self.indices[i * self.k..(i + 1) * self.k];
         let n = list.iter().position(|&j| j == NONE).unwrap_or(self.k);
         &list[..n]
+    }
+
+    /// Neighbours of query `i` with their squared distances, nearest first.
+    pub fn with_distances(&self, i: usize) -> impl Iterator<Item = (u32, f32)> + '_ {
+        let places = i * self.k..(i + 1) * self.k;
+        let indices = self.indices[places.clone()].iter().copied();
+        indices
+            .zip(self.distances[places].iter().copied())
+            .take_while(|&(j, _)| j != NONE)
+    }
+
+    /// Longest list.
+    pub fn k(&self) -> usize {
+        self.k
     }
 
     /// Number of queries.
@@ -58,43 +75,61 @@ impl Grid {
     ///
     /// Both grids have the same cell size. Equal distances are ordered by original index.
     pub fn nearest(&self, queries: &Self, search: &Search) -> Neighbors {
+        let arch = Arch::new();
         let tasks: Vec<usize> = (0..queries.n_cells()).step_by(CELLS_PER_TASK).collect();
-        let found: Vec<Vec<(u32, Best)>> = tasks
+        let found: Vec<(Vec<u32>, Vec<(f32, u32)>)> = tasks
             .into_par_iter()
             .map(|first| {
-                let last = (first + CELLS_PER_TASK).min(queries.n_cells());
-                (first..last)
-                    .flat_map(|c| self.search_cell(queries, c, search))
-                    .collect()
+                let cells = first..(first + CELLS_PER_TASK).min(queries.n_cells());
+                // The widest instructions of the machine; the order of operations is the same.
+                arch.dispatch(|| self.search_cells(queries, cells, search))
             })
             .collect();
-        let mut indices = vec![NONE; queries.len() * search.k];
-        for (query, best) in found.into_iter().flatten() {
-            let list = &mut indices[query as usize * search.k..][..search.k];
-            for (place, (_, j)) in list.iter_mut().zip(best.list) {
-                *place = j;
+        let k = search.k;
+        let mut indices = vec![NONE; queries.len() * k];
+        let mut distances = vec![f32::INFINITY; queries.len() * k];
+        for (originals, lists) in found {
+            for (query, list) in originals.iter().zip(lists.chunks_exact(k)) {
+                for (place, &(distance, index)) in (*query as usize * k..).zip(list) {
+                    indices[place] = index;
+                    distances[place] = distance;
+                }
             }
         }
         Neighbors {
-            k: search.k,
+            k,
             indices,
+            distances,
         }
     }
 
-    fn search_cell(&self, queries: &Self, cell: usize, search: &Search) -> Vec<(u32, Best)> {
-        let runs = self.runs_around(queries.cell_key(cell));
-        let search_one = |s: usize| {
-            let (feature, time) = queries.feature(s);
-            let mut best = Best::new(search);
-            for run in &runs {
-                self.scan(run, &feature, time, search, &mut best);
+    /// Original indices of the queries in `cells`, and their lists one after the other.
+    #[inline(always)]
+    fn search_cells(
+        &self,
+        queries: &Self,
+        cells: Range<usize>,
+        search: &Search,
+    ) -> (Vec<u32>, Vec<(f32, u32)>) {
+        let (mut originals, mut lists) = (Vec::new(), Vec::new());
+        let mut best = Best::new(search);
+        for cell in cells {
+            let runs = self.runs_around(queries.cell_key(cell));
+            for s in queries.cell(cell) {
+                let (feature, time) = queries.feature(s);
+                best.clear();
+                for run in &runs {
+                    self.scan(run, &feature, time, search, &mut best);
+                }
+                originals.push(queries.original(s));
+                lists.extend_from_slice(&best.list);
             }
-            (queries.original(s), best)
-        };
-        queries.cell(cell).map(search_one).collect()
+        }
+        (originals, lists)
     }
 
     /// Scans a run of candidates, several distances at a time.
+    #[inline(always)]
     fn scan(
         &self,
         run: &Range<usize>,
@@ -103,41 +138,72 @@ impl Grid {
         search: &Search,
         best: &mut Best,
     ) {
-        let mut first = run.start;
-        while first < run.end {
-            let last = (first + LANES).min(run.end);
-            let (columns, times) = self.run(first..last);
+        let (columns, times) = self.run(run.clone());
+        for first in (0..times.len()).step_by(LANES) {
+            let n = LANES.min(times.len() - first);
             let mut distances = [f32::INFINITY; LANES];
-            gated_distances(&columns, times, feature, time, search, &mut distances);
-            for (lane, &d) in distances[..last - first].iter().enumerate() {
+            let block = columns.map(|c| &c[first..first + n]);
+            let block_times = &times[first..first + n];
+            if let (Some(full), Some(full_times)) = (full_block(&block), block_times.first_chunk())
+            {
+                gated_distances(full, full_times, feature, time, search, &mut distances);
+            } else {
+                let mut padded = [[f32::INFINITY; LANES]; 6];
+                for (to, from) in padded.iter_mut().zip(&block) {
+                    to[..n].copy_from_slice(from);
+                }
+                let mut padded_times = [time; LANES];
+                padded_times[..n].copy_from_slice(block_times);
+                let padded = padded.each_ref();
+                gated_distances(padded, &padded_times, feature, time, search, &mut distances);
+            }
+            let nearest = distances
+                .iter()
+                .fold(f32::INFINITY, |a, &b| if b < a { b } else { a });
+            if nearest > best.worst {
+                continue;
+            }
+            for (lane, &d) in distances[..n].iter().enumerate() {
                 if d <= best.worst {
-                    best.insert(d, self.original(first + lane));
+                    best.insert(d, self.original(run.start + first + lane));
                 }
             }
-            first = last;
         }
     }
 }
 
-/// Squared distances of up to `LANES` candidates; infinite where the time gap is too small.
-#[inline]
+/// The six columns as arrays, if they are long enough.
+#[inline(always)]
+fn full_block<'a>(block: &[&'a [f32]; 6]) -> Option<[&'a [f32; LANES]; 6]> {
+    let [a, b, c, d, e, f] = block;
+    Some([
+        a.first_chunk()?,
+        b.first_chunk()?,
+        c.first_chunk()?,
+        d.first_chunk()?,
+        e.first_chunk()?,
+        f.first_chunk()?,
+    ])
+}
+
+/// Squared distances of `LANES` candidates; infinite where the time gap is too small.
+#[inline(always)]
 fn gated_distances(
-    columns: &[&[f32]; 6],
-    times: &[f32],
+    columns: [&[f32; LANES]; 6],
+    times: &[f32; LANES],
     feature: &[f32; 6],
     time: f32,
     search: &Search,
     distances: &mut [f32; LANES],
 ) {
-    let n = times.len();
     let mut sums = [0.0_f32; LANES];
-    for (column, &f) in columns.iter().zip(feature) {
-        for (sum, &c) in sums[..n].iter_mut().zip(&column[..n]) {
+    for (column, f) in columns.into_iter().zip(feature) {
+        for (sum, c) in sums.iter_mut().zip(column) {
             let difference = c - f;
             *sum += difference * difference;
         }
     }
-    for ((d, &sum), &t) in distances[..n].iter_mut().zip(&sums[..n]).zip(times) {
+    for ((d, sum), t) in distances.iter_mut().zip(sums).zip(times) {
         *d = if (t - time).abs() > search.min_time_gap {
             sum
         } else {
@@ -146,35 +212,40 @@ fn gated_distances(
     }
 }
 
-/// The best candidates so far, nearest first.
+/// The best `k` candidates so far, nearest first; empty places are infinitely far.
 #[derive(Debug)]
 struct Best {
     list: Vec<(f32, u32)>,
-    k: usize,
+    /// Squared distance beyond which nothing counts.
+    limit: f32,
     /// Squared distance a candidate must not exceed.
     worst: f32,
 }
 
 impl Best {
     fn new(search: &Search) -> Self {
-        let worst = search.max_distance * search.max_distance;
+        let limit = search.max_distance * search.max_distance;
         Self {
-            list: Vec::with_capacity(search.k + 1),
-            k: search.k,
-            worst,
+            list: vec![(f32::INFINITY, NONE); search.k],
+            limit,
+            worst: limit,
         }
     }
 
+    fn clear(&mut self) {
+        self.list.fill((f32::INFINITY, NONE));
+        self.worst = self.limit;
+    }
+
     fn insert(&mut self, distance: f32, index: u32) {
-        let at = self
-            .list
-            .partition_point(|&(d, i)| (d, i) < (distance, index));
-        self.list.insert(at, (distance, index));
-        self.list.truncate(self.k);
-        if self.list.len() == self.k
-            && let Some(&(d, _)) = self.list.last()
-        {
-            self.worst = d;
+        let mut place = (distance, index);
+        for entry in &mut self.list {
+            if place < *entry {
+                std::mem::swap(entry, &mut place);
+            }
+        }
+        if let Some(&(last, _)) = self.list.last() {
+            self.worst = last.min(self.limit);
         }
     }
 }

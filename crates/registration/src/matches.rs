@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Pairs of surfels that are taken for the same patch of a surface.
 
-use bentwing_neighbors::{Grid, Search, mutual_pairs};
+use bentwing_neighbors::{Grid, Search, claimed_pairs, mutual_pairs};
 use bentwing_trajectory::Head;
 use rayon::prelude::*;
 
@@ -60,8 +60,7 @@ pub fn find(placed: &Placed, views: &[&FixedView], settings: &Settings) -> Vec<M
         let first = placed.level_starts[level] as u32;
         let grid = grid_of(&placed.surfels[placed.level(level)], size);
         let nearest = grid.nearest(&grid, &search);
-        let pairs = mutual_pairs(&nearest, &nearest).filter(|(a, b)| a < b);
-        matches.extend(pairs.map(|(a, b)| Match {
+        matches.extend(mutual_pairs(&nearest).map(|(a, b)| Match {
             surfel: first + a,
             target: Target::Moving(first + b),
         }));
@@ -69,10 +68,10 @@ pub fn find(placed: &Placed, views: &[&FixedView], settings: &Settings) -> Vec<M
             let Some(fixed) = view.grids.get(level) else {
                 continue;
             };
-            let forward = fixed.nearest(&grid, &search);
-            let backward = grid.nearest(fixed, &search);
+            let nearest = fixed.nearest(&grid, &search);
             let first_fixed = view.level_starts[level] as u32;
-            matches.extend(mutual_pairs(&forward, &backward).map(|(a, b)| Match {
+            let pairs = claimed_pairs(&nearest, fixed.len());
+            matches.extend(pairs.into_iter().map(|(a, b)| Match {
                 surfel: first + a,
                 target: Target::Fixed(v, first_fixed + b),
             }));
@@ -103,7 +102,7 @@ impl<'a> Linearization<'a> {
     pub fn new(
         placed: &'a Placed,
         views: &[&FixedView],
-        matches: Vec<Match>,
+        matches: &[Match],
         head: &'a Head,
         settings: &Settings,
     ) -> Self {
@@ -143,9 +142,9 @@ impl<'a> Linearization<'a> {
                 .par_iter()
                 .map(|rows| self.sum(rows, step, scale))
                 .collect();
-            for (group, part) in &sums {
+            for (group, part) in sums {
                 group.flush(equations);
-                health.merge(part);
+                health.merge(&part);
             }
         }
         health
@@ -179,6 +178,6 @@ impl<'a> Linearization<'a> {
             group.add(plane.residual, w * plane.information);
             health.add(other.is_none(), x, w, n, &surfel.lever);
         }
-        (group, health)
+        (group.summed(), health)
     }
 }

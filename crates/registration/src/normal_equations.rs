@@ -5,8 +5,10 @@ use std::collections::BTreeMap;
 
 use crate::{GlobalMatrix, GlobalVector, N_GLOBALS};
 
-/// A 6×6 block, row by row.
-pub type Block = [f64; 36];
+/// A 6×6 block, column by column.
+pub type Block = [[f64; 6]; 6];
+
+const EMPTY: Block = [[0.0; 6]; 6];
 
 /// `AᵀWA` and `AᵀW r` (Kaul 2015, eq. 4). Blocks far off the diagonal appear wherever surfels of
 /// different times match.
@@ -28,7 +30,7 @@ impl NormalEquations {
     /// Empty equations for `n_controls` control points; every diagonal block exists.
     pub fn new(n_controls: usize) -> Self {
         Self {
-            blocks: (0..n_controls).map(|k| ((k, k), [0.0; 36])).collect(),
+            blocks: (0..n_controls).map(|k| ((k, k), EMPTY)).collect(),
             arrow: vec![[[0.0; 6]; N_GLOBALS]; n_controls],
             corner: GlobalMatrix::zeros(),
             knot_gradient: vec![[0.0; 6]; n_controls],
@@ -44,28 +46,30 @@ impl NormalEquations {
 
     /// Adds a 6×6 block between two control points. A block that is off the diagonal of its group
     /// (`!on_diagonal`) but joins a control point with itself stands for its transpose as well.
+    /// Of blocks on the diagonal only the lower triangle counts.
     pub(crate) fn add_block(
         &mut self,
         row: usize,
         column: usize,
         on_diagonal: bool,
-        block: impl Fn(usize, usize) -> f64,
+        block: &Block,
     ) {
-        let transposed = row < column;
-        let key = if transposed {
-            (column, row)
-        } else {
-            (row, column)
-        };
-        let both = row == column && !on_diagonal;
-        let target = self.blocks.entry(key).or_insert([0.0; 36]);
-        for r in 0..6 {
+        let key = (row.max(column), row.min(column));
+        let target = self.blocks.entry(key).or_insert(EMPTY);
+        if row >= column {
+            for (to, from) in target
+                .as_flattened_mut()
+                .iter_mut()
+                .zip(block.as_flattened())
+            {
+                *to += from;
+            }
+        }
+        if row < column || (row == column && !on_diagonal) {
             for c in 0..6 {
-                let mut v = if transposed { block(c, r) } else { block(r, c) };
-                if both {
-                    v += block(c, r);
+                for r in 0..6 {
+                    target[c][r] += block[r][c];
                 }
-                target[6 * r + c] += v;
             }
         }
     }

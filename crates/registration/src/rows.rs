@@ -1,44 +1,49 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Rows that touch the same control points are summed in one small dense block.
 
+use faer::linalg::matmul::triangular::{BlockStructure, matmul};
+use faer::{Accum, Mat, MatRef, Par};
+
+use crate::normal_equations::Block;
 use crate::{GlobalVector, N_GLOBALS, NormalEquations};
 
-/// Rows are padded to a multiple of this.
-const LANES: usize = 4;
+/// Rows that are gathered before they are multiplied; with their block they fit a core's cache.
+const GATHERED: usize = 96;
 
 /// `Σ w Jᵀ J` and `Σ w Jᵀ r` of rows that share their control points.
+///
+/// A row is six entries per control point, the global states, and the residual.
 #[derive(Clone, Debug)]
 pub struct RowGroup {
     controls: Vec<usize>,
-    /// Row length: six per control point, the globals, padding.
     width: usize,
-    /// Lower triangle, row by row; what stands above the diagonal is not used.
-    information: Vec<f64>,
-    gradient: Vec<f64>,
+    /// The row being filled.
     row: Vec<f64>,
-    cost: f64,
+    /// Rows times the roots of their weights, one after the other.
+    gathered: Vec<f64>,
+    /// Lower triangle of `Σ w [J r]ᵀ [J r]`.
+    sum: Mat<f64>,
 }
 
 impl RowGroup {
     /// A group for the control points `controls`, which may repeat.
     pub fn new(controls: Vec<usize>) -> Self {
-        let width = (6 * controls.len() + N_GLOBALS).next_multiple_of(LANES);
+        let width = 6 * controls.len() + N_GLOBALS + 1;
         Self {
             controls,
             width,
-            information: vec![0.0; width * width],
-            gradient: vec![0.0; width],
             row: vec![0.0; width],
-            cost: 0.0,
+            gathered: Vec::new(),
+            sum: Mat::zeros(width, width),
         }
     }
 
-    /// Control points of the group.
-    pub fn controls(&self) -> &[usize] {
-        &self.controls
+    /// Sets the row to zero.
+    pub fn clear_row(&mut self) {
+        self.row.fill(0.0);
     }
 
-    /// The row to be filled before [`RowGroup::add`]: six entries per control point.
+    /// Six entries of the row per control point.
     pub fn knots_mut(&mut self) -> &mut [f64] {
         &mut self.row[..6 * self.controls.len()]
     }
@@ -69,60 +74,70 @@ impl RowGroup {
 
     /// Adds the current row with residual `r` and weight `w`.
     pub fn add(&mut self, r: f64, w: f64) {
-        self.cost += w * r * r;
-        let row = &self.row;
-        for (a, &value) in row.iter().enumerate() {
-            if value == 0.0 {
-                continue;
-            }
-            let scaled = w * value;
-            self.gradient[a] += scaled * r;
-            let end = (a + 1).next_multiple_of(LANES);
-            let start = a * self.width;
-            let target = &mut self.information[start..start + end];
-            for (t, v) in target
-                .chunks_exact_mut(LANES)
-                .zip(row[..end].chunks_exact(LANES))
-            {
-                for lane in 0..LANES {
-                    t[lane] += scaled * v[lane];
-                }
-            }
+        let root = w.sqrt();
+        self.row[self.width - 1] = r;
+        self.gathered.extend(self.row.iter().map(|v| v * root));
+        if self.gathered.len() >= GATHERED * self.width {
+            self.multiply();
         }
+    }
+
+    fn multiply(&mut self) {
+        let n = self.gathered.len() / self.width;
+        let columns = MatRef::from_column_major_slice(&self.gathered, self.width, n);
+        matmul(
+            self.sum.as_mut(),
+            BlockStructure::TriangularLower,
+            Accum::Add,
+            columns,
+            BlockStructure::Rectangular,
+            columns.transpose(),
+            BlockStructure::Rectangular,
+            1.0,
+            Par::Seq,
+        );
+        self.gathered.clear();
+    }
+
+    /// Sums what was added.
+    pub fn summed(mut self) -> Self {
+        self.multiply();
+        self
     }
 
     /// Adds the sums to the equations of the whole problem.
-    pub fn flush(&self, equations: &mut NormalEquations) {
-        equations.cost += self.cost;
-        let first_global = 6 * self.controls.len();
-        for (a, &row_control) in self.controls.iter().enumerate() {
-            for (b, &column_control) in self.controls[..=a].iter().enumerate() {
-                let block = |r: usize, c: usize| self.at(6 * a + r, 6 * b + c);
-                equations.add_block(row_control, column_control, a == b, block);
+    pub fn flush(self, equations: &mut NormalEquations) {
+        let group = self.summed();
+        let (first_global, residual) = (6 * group.controls.len(), group.width - 1);
+        equations.cost += group.column(residual)[residual];
+        for (a, &row_control) in group.controls.iter().enumerate() {
+            for (b, &column_control) in group.controls[..=a].iter().enumerate() {
+                let block: Block = std::array::from_fn(|c| {
+                    let column = group.column(6 * b + c);
+                    std::array::from_fn(|r| column[6 * a + r])
+                });
+                equations.add_block(row_control, column_control, a == b, &block);
             }
-            let gradient = equations.knot_gradient_mut(row_control);
-            for (g, v) in gradient.iter_mut().zip(&self.gradient[6 * a..]) {
-                *g += v;
-            }
-            let arrow = equations.arrow_mut(row_control);
-            for (g, column) in arrow.iter_mut().enumerate() {
-                for (r, v) in column.iter_mut().enumerate() {
-                    *v += self.at(first_global + g, 6 * a + r);
+            for r in 0..6 {
+                let column = group.column(6 * a + r);
+                equations.knot_gradient_mut(row_control)[r] += column[residual];
+                let arrow = equations.arrow_mut(row_control);
+                for (g, v) in column[first_global..residual].iter().enumerate() {
+                    arrow[g][r] += v;
                 }
             }
         }
-        for r in 0..N_GLOBALS {
-            equations.global_gradient[r] += self.gradient[first_global + r];
-            for c in 0..=r {
-                let v = self.at(first_global + r, first_global + c);
-                equations.add_corner(r, c, v);
+        for c in 0..N_GLOBALS {
+            let column = group.column(first_global + c);
+            equations.global_gradient[c] += column[residual];
+            for r in c..N_GLOBALS {
+                equations.add_corner(r, c, column[first_global + r]);
             }
         }
     }
 
-    /// Entry of the symmetric sum.
-    fn at(&self, r: usize, c: usize) -> f64 {
-        let (r, c) = if r >= c { (r, c) } else { (c, r) };
-        self.information[r * self.width + c]
+    /// A column of the sum, of which the entries on and below the diagonal are set.
+    fn column(&self, c: usize) -> &[f64] {
+        self.sum.col_as_slice(c)
     }
 }

@@ -243,8 +243,8 @@ fn for_each_entry(
         let (Some(r0), Some(c0)) = (layout.knot(row), layout.knot(column)) else {
             continue;
         };
-        for (i, &v) in block.iter().enumerate() {
-            let (r, c) = (r0 + i / 6, c0 + i % 6);
+        for (i, &v) in block.as_flattened().iter().enumerate() {
+            let (r, c) = (r0 + i % 6, c0 + i / 6);
             if r >= c {
                 visit(r, c, v);
             }

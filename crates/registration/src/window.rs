@@ -75,19 +75,26 @@ pub fn register_window(
 ) -> Result<Registration, SolveError> {
     let mut state = State::new(&problem, settings);
     let mut solver = Solver::default();
-    let (mut converged, mut n_outer) = (false, 0);
-    let mut last = None;
-    while n_outer < settings.max_outer && !converged {
+    let (mut step_size, mut n_outer) = (StepSize::UNKNOWN, 0);
+    let (mut pairs, mut last) = (Vec::new(), None);
+    while n_outer < settings.max_outer && !step_size.converged(settings) {
         let placed = Placed::new(
             problem.sets,
             &state.trajectory,
             &state.globals,
             &state.spline,
         );
-        let pairs = matches::find(&placed, problem.views, settings);
+        if step_size.moves_matches() {
+            pairs = matches::find(&placed, problem.views, settings);
+        }
         let fixed_rows = state.fixed_rows(&problem, settings);
-        let linearization =
-            Linearization::new(&placed, problem.views, pairs, &state.globals.head, settings);
+        let linearization = Linearization::new(
+            &placed,
+            problem.views,
+            &pairs,
+            &state.globals.head,
+            settings,
+        );
         let scale = if n_outer == 0 {
             settings.first_cauchy_scale
         } else {
@@ -106,10 +113,33 @@ pub fn register_window(
             step = factorized.solve();
             last = Some((factorized, health, placed.surfels.len()));
         }
-        converged = state.apply(&step, settings)?;
+        step_size = state.apply(&step)?;
         n_outer += 1;
     }
-    Ok(state.finish(last, n_outer, converged))
+    Ok(state.finish(last, n_outer, step_size.converged(settings)))
+}
+
+/// Largest correction of a sample in one step, rad and m.
+#[derive(Clone, Copy, Debug)]
+struct StepSize {
+    turn: f64,
+    shift: f64,
+}
+
+impl StepSize {
+    const UNKNOWN: Self = Self {
+        turn: f64::INFINITY,
+        shift: f64::INFINITY,
+    };
+
+    fn converged(self, settings: &Settings) -> bool {
+        self.turn < settings.min_rotation && self.shift < settings.min_translation
+    }
+
+    /// Whether nearest neighbours may be others now; a fortieth of the finest voxel changes few.
+    fn moves_matches(self) -> bool {
+        self.shift > 0.01 || self.turn > 1e-3
+    }
 }
 
 /// What changes from iteration to iteration.
@@ -161,8 +191,8 @@ impl State {
         equations
     }
 
-    /// Composes a step into the state; returns whether it was small.
-    fn apply(&mut self, step: &Solution, settings: &Settings) -> Result<bool, SolveError> {
+    /// Composes a step into the state; returns how large it was.
+    fn apply(&mut self, step: &Solution) -> Result<StepSize, SolveError> {
         let finite = |v: &[f64]| v.iter().all(|x| x.is_finite());
         if !finite(&step.globals) || !step.knots.iter().all(|k| finite(k)) {
             return Err(SolveError::NotFinite);
@@ -185,7 +215,7 @@ impl State {
         for (m, d) in self.moved.iter_mut().zip(step.globals) {
             *m += d;
         }
-        Ok(turn < settings.min_rotation && shift < settings.min_translation)
+        Ok(StepSize { turn, shift })
     }
 
     fn finish(

@@ -25,8 +25,6 @@ if TYPE_CHECKING:
 
 # A rest shorter than this is waited out before the start is judged, s.
 LOOK_AHEAD = 6.0
-# The windows begin this long before the end of the rest, s.
-REST_KEPT = 1.0
 
 
 class Continuous:
@@ -108,8 +106,7 @@ class Continuous:
         return True
 
     def _new_pass(self, start: Start, learned: OdometryPass | None) -> OdometryPass:
-        hold = max(self._first, start.hold - REST_KEPT) if start.static is not None else self._first
-        n = max(2, round((hold - self._first) / DT) + 1)
+        n = max(2, int((start.hold - self._first) / DT) + 1)
         slow = self._initial_globals(start) if learned is None else self._learned_globals(learned)
         quat = start.quat_xyzw
         if learned is not None and start.static is not None:
@@ -129,15 +126,18 @@ class Continuous:
                 prior.tighten("gyro_bias", start.static.gyro_bias_std)
         else:
             prior = learned.prior
-        return OdometryPass(
+        begun = OdometryPass(
             samples,
             slow,
             prior,
             self.settings,
             self._core,
             self._threads,
-            clamped=start.static is not None,
+            resting=start.static is not None,
         )
+        if start.static is not None and self.settings.n_views:
+            begun.look_around(self._buffer)
+        return begun
 
     def _initial_globals(self, start: Start) -> _core.Globals:
         encoder, gravity = self._payload.encoder, (0.0, 0.0, STANDARD_GRAVITY)

@@ -44,8 +44,9 @@ class OdometryPass:
         core: CoreSettings,
         threads: int,
         *,
-        clamped: bool,
+        resting: bool,
     ) -> None:
+        """Begin with `samples`; with `resting` all of them are at rest and never corrected."""
         self.samples = samples
         self.globals = slow
         self.prior = prior
@@ -54,8 +55,10 @@ class OdometryPass:
         self._settings = settings
         self._core = core
         self._threads = threads
-        self._clamped = clamped
+        self._resting = resting
         self._origin = samples.start
+        # Windows begin no earlier than this.
+        self._anchor = samples.end if resting else samples.start
         self._surfels: list[tuple[float, _core.Surfels]] = []
         self._views = FixedViews(settings)
         self._finished: list[tuple[NDArray[np.float64], NDArray[np.float64]]] = []
@@ -68,6 +71,12 @@ class OdometryPass:
     def end(self) -> float:
         """Stamp up to which lidar data was used, s."""
         return self._end
+
+    def look_around(self, buffer: BatchBuffer) -> None:
+        """Freeze what was seen at rest; a 2D lidar sees no surfels then, a 3D lidar its first view."""
+        start = max(self._origin, self._end - self._settings.view_length)
+        seen = self._extract(buffer.lidar(start, self._end))
+        self._views.add(_core.FixedView([seen], start, self._end, self.samples, self.globals))
 
     def step(self, buffer: BatchBuffer, end: float) -> None:
         """Take the lidar data up to `end`, s, and register the window that ends there."""
@@ -110,13 +119,13 @@ class OdometryPass:
         )
 
     def _window_start(self, end: float) -> float:
-        return max(self._origin, end - self._settings.window)
+        return max(self._anchor, end - self._settings.window)
 
     def _register(self, imu: _core.Imu | None) -> None:
         start = self._window_start(self._end)
         first = max(0, round((start - self.samples.start) / DT))
         window = self.samples.slice(first, len(self.samples) - 1)
-        clamped = self._clamped or start > self._origin
+        clamped = self._resting or start > self._origin
         result = _core.register_window(
             window,
             [s for t, s in self._surfels if t >= start - 1e-6],

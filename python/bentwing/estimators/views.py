@@ -29,6 +29,11 @@ class FixedViews:
         self._settings = settings
         self._place: NDArray[np.float64] | None = None
 
+    def add(self, view: _core.FixedView) -> None:
+        """Take a view in place of the oldest; one without surfels is passed over."""
+        if len(view):
+            self.views = [*self.views, view][-self._settings.n_views :]
+
     def update(
         self,
         surfels: Sequence[tuple[float, _core.Surfels]],
@@ -44,8 +49,8 @@ class FixedViews:
         place = samples.position_at(window_start)
         moved = self._place is None or np.linalg.norm(place - self._place) >= self._settings.view_distance
         n_left = sum(int(((s.stamps >= start) & (s.stamps < window_start)).sum()) for s in left)
-        if not moved and n_left < RICHER * min(len(v) for v in self.views):
+        poorest = min((len(v) for v in self.views), default=0)
+        if not moved and n_left < RICHER * poorest:
             return
-        view = _core.FixedView(left, start, window_start, samples, slow)
-        self.views = [*self.views, view][-self._settings.n_views :]
+        self.add(_core.FixedView(left, start, window_start, samples, slow))
         self._place = place

@@ -74,8 +74,7 @@ fn add_gyro(
     let e = gyro_residual(trajectory, globals, n, turned);
     let group = rows.group(stencil.first);
     for row in 0..3 {
-        group.knots_mut().fill(0.0);
-        group.globals_mut().fill(0.0);
+        group.clear_row();
         add_stencil(group.knots_mut(), &stencil, &J, row, 0);
         group.globals_mut()[index::GYRO_BIAS.start + row] = -1.0;
         group.add(e[row], noise.gyro.powi(-2));
@@ -106,8 +105,7 @@ fn add_accel(
     let e = accel_residual(trajectory, globals, n, node);
     let group = rows.group(curvature.first);
     for row in 0..3 {
-        group.knots_mut().fill(0.0);
-        group.globals_mut().fill(0.0);
+        group.clear_row();
         add_stencil(group.knots_mut(), &curvature, &-R_imu_map, row, 3);
         add_stencil(group.knots_mut(), &value, &J_rotation, row, 0);
         let g = group.globals_mut();

@@ -15,8 +15,8 @@ pub fn add(equations: &mut NormalEquations, spline: &CorrectionSpline, t: f64) {
     let basis = spline.basis(t);
     let mut group = RowGroup::new((basis.first..basis.first + 4).collect());
     for part in 0..6 {
+        group.clear_row();
         let knots = group.knots_mut();
-        knots.fill(0.0);
         for (m, w) in basis.weights.iter().enumerate() {
             knots[6 * m + part] = *w;
         }

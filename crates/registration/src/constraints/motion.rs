@@ -42,8 +42,7 @@ fn add_accel(
     let weight = dt / settings.motion_accel_density.powi(2);
     let group = rows.group(curvature.first);
     for row in 0..3 {
-        group.knots_mut().fill(0.0);
-        group.globals_mut().fill(0.0);
+        group.clear_row();
         add_stencil(group.knots_mut(), &curvature, &Matrix3::identity(), row, 3);
         group.add(e[row], weight);
     }
@@ -74,8 +73,7 @@ fn add_angular(
     let weight = dt / settings.motion_angular_density.powi(2);
     let group = rows.group(after.first);
     for row in 0..3 {
-        group.knots_mut().fill(0.0);
-        group.globals_mut().fill(0.0);
+        group.clear_row();
         add_stencil(group.knots_mut(), &after, &J_after, row, 0);
         add_stencil(group.knots_mut(), &before, &J_before, row, 0);
         group.add(e[row], weight);

@@ -131,7 +131,10 @@ impl Scene {
         let mut trajectory = self.trajectory.clone();
         let correction = |n| {
             let d = spline.evaluate(controls, self.trajectory.time(n));
-            [Vector3::new(d[0], d[1], d[2]), Vector3::new(d[3], d[4], d[5])]
+            [
+                Vector3::new(d[0], d[1], d[2]),
+                Vector3::new(d[3], d[4], d[5]),
+            ]
         };
         let corrections: Vec<_> = (0..trajectory.len()).map(correction).collect();
         trajectory.correct(&corrections);
@@ -140,10 +143,7 @@ impl Scene {
 
     /// Central differences of `residuals` by every unknown; fourth order, so that a step large
     /// enough against rounding has no error of its own.
-    fn derivatives(
-        &self,
-        residuals: impl Fn(&[[f64; 6]], &Globals) -> Vec<f64>,
-    ) -> Vec<Vec<f64>> {
+    fn derivatives(&self, residuals: impl Fn(&[[f64; 6]], &Globals) -> Vec<f64>) -> Vec<Vec<f64>> {
         let at = |unknown: usize, size: f64| {
             let (controls, globals) = self.step(unknown, size);
             residuals(&controls, &globals)
@@ -151,9 +151,13 @@ impl Scene {
         let h = 1e-3;
         let derivative = |u: usize| {
             let [a, b, c, d] = [at(u, -2.0 * h), at(u, -h), at(u, h), at(u, 2.0 * h)];
-            (0..a.len()).map(|i| (a[i] - 8.0 * b[i] + 8.0 * c[i] - d[i]) / (12.0 * h)).collect()
+            (0..a.len())
+                .map(|i| (a[i] - 8.0 * b[i] + 8.0 * c[i] - d[i]) / (12.0 * h))
+                .collect()
         };
-        (0..6 * self.spline().n_controls() + N_GLOBALS).map(derivative).collect()
+        (0..6 * self.spline().n_controls() + N_GLOBALS)
+            .map(derivative)
+            .collect()
     }
 }
 
@@ -198,7 +202,7 @@ fn gradient_of(equations: &NormalEquations) -> Vec<f64> {
 fn diagonal_of(equations: &NormalEquations) -> Vec<f64> {
     let knot = |k: usize| (0..6).map(move |i| (k, i));
     let knots = (0..equations.n_controls()).flat_map(knot);
-    let knots = knots.map(|(k, i)| equations.blocks[&(k, k)][7 * i]);
+    let knots = knots.map(|(k, i)| equations.blocks[&(k, k)][i][i]);
     knots
         .chain((0..N_GLOBALS).map(|g| equations.corner()[(g, g)]))
         .collect()

@@ -78,10 +78,11 @@ class Continuous:
         NotEnoughDataError
             There is none yet.
         """
-        if self._pass is None or not self._pass.windows:
+        done = self._pass
+        if done is None or not done.windows or done.end - self._first < self._sliding.shift:
             msg = f"less than {self._sliding.shift:g} s of lidar points; nothing can be estimated"
             raise NotEnoughDataError(msg)
-        return self._estimate(self._pass)
+        return self._estimate(done)
 
     def _advance(self, *, finishing: bool) -> None:
         ready = self._ready_until(finishing=finishing)

@@ -3,11 +3,13 @@
 
 from __future__ import annotations
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, field_validator
+
+from bentwing.estimators.slow_states import SLICES
 
 
 class _Section(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
 class SurfelSettings(_Section):
@@ -52,7 +54,9 @@ class ContinuousSettings(_Section):
     shift: float = Field(1.0, gt=0, description="new data per step, s")
     window_without_imu: float = Field(2.0, gt=0, description="length without an IMU, s")
     shift_without_imu: float = Field(
-        0.2, gt=0, description="new data per step without an IMU, s: how long velocities are extrapolated"
+        0.2,
+        gt=0,
+        description="new data per step without an IMU, s: how long velocities are extrapolated",
     )
     rehearsal: float = Field(
         20.0,
@@ -67,6 +71,15 @@ class ContinuousSettings(_Section):
     )
     surfels: SurfelSettings = SurfelSettings()
     registration: RegistrationSettings = RegistrationSettings()
+
+    @field_validator("frozen")
+    @classmethod
+    def _known_states(cls, names: tuple[str, ...]) -> tuple[str, ...]:
+        unknown = sorted(set(names) - SLICES.keys())
+        if unknown:
+            msg = f"unknown states {unknown}; choose from {list(SLICES)}"
+            raise ValueError(msg)
+        return names
 
     def without_imu(self) -> ContinuousSettings:
         """Return the settings with the window that suits a lidar alone."""

@@ -23,6 +23,8 @@ STANDARD_GRAVITY = 9.80665
 # A start in motion takes its first attitude from the mean force over this time, s: long enough
 # for the accelerations of a flight to average out.
 MOVING_MEAN = 1.0
+# A motion may begin too softly to be noticed: the last part of a rest is estimated, not held, s.
+LATE_HOLD = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +67,8 @@ def find_start(imu: ImuBatch, noise: Imu) -> Start:
     # Only the part of the bias along gravity shows at rest; the rest is in the attitude.
     force = static.accel_mean
     bias = force * (1.0 - STANDARD_GRAVITY / float(np.linalg.norm(force)))
-    return Start(static, attitude_of(force), static.gyro_bias, bias, static.end)
+    hold = max(static.start, static.end - LATE_HOLD)
+    return Start(static, attitude_of(force), static.gyro_bias, bias, hold)
 
 
 def attitude_of(force: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -18,6 +18,9 @@ MIN_STATIC = 0.5  # s
 MAX_REST_RATE = 0.1  # rad/s
 MAX_ACCEL_CHANGE = 0.3  # m/s² between the halves of the stretch; more is tilting or driving off
 SMOOTHING = 0.05  # s; single samples leave the median by vibration alone
+# A carrier without a spinning payload may lift off without turning: then the force tells.
+MAX_FORCE_DEPARTURE = 0.15  # m/s² from the median
+FORCE_SMOOTHING = 0.2  # s; rotors shake the accelerometer by 1 m/s² and more
 BLOCK = 0.25  # s; vibration averages out within it, what remains is the error of the mean
 
 
@@ -66,7 +69,7 @@ def find_static_start(
     StaticStart or None
         None where less than 0.5 s is static: the estimator then starts with wide priors.
     """
-    n = _static_samples(times, gyro)
+    n = _static_samples(times, gyro, accel)
     if n < 2 or times[n - 1] - times[0] < MIN_STATIC:
         return None
     times, gyro, accel = times[:n], gyro[:n], accel[:n]
@@ -97,7 +100,9 @@ def level_attitude(accel: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.array([[cp, sp * sr, sp * cr], [0.0, cr, -sr], [-sp, cp * sr, cp * cr]])
 
 
-def _static_samples(times: NDArray[np.float64], gyro: NDArray[np.float64]) -> int:
+def _static_samples(
+    times: NDArray[np.float64], gyro: NDArray[np.float64], accel: NDArray[np.float64]
+) -> int:
     """Return how many samples at the start are static.
 
     The median is that of the first half second, then that of the stretch found with it: over a
@@ -106,11 +111,12 @@ def _static_samples(times: NDArray[np.float64], gyro: NDArray[np.float64]) -> in
     if len(times) < 2:
         return 0
     n = int(np.searchsorted(times, times[0] + MIN_STATIC))
-    smooth = _smoothed(times, gyro)
+    rate, force = _smoothed(times, gyro, SMOOTHING), _smoothed(times, accel, FORCE_SMOOTHING)
     for _ in range(2):
         if n < 2:
             return 0
-        departed = np.linalg.norm(smooth - np.median(gyro[:n], axis=0), axis=1) > MAX_DEPARTURE
+        departed = _departs(rate, gyro[:n], MAX_DEPARTURE)
+        departed |= _departs(force, accel[:n], MAX_FORCE_DEPARTURE)
         if not departed.any():
             return len(times)
         end = times[int(np.argmax(departed))] - MARGIN
@@ -118,13 +124,22 @@ def _static_samples(times: NDArray[np.float64], gyro: NDArray[np.float64]) -> in
     return n
 
 
-def _smoothed(times: NDArray[np.float64], gyro: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the moving average over SMOOTHING seconds, (M, 3)."""
+def _departs(
+    smooth: NDArray[np.float64], rest: NDArray[np.float64], limit: float
+) -> NDArray[np.bool_]:
+    """Tell which samples (M, 3) are farther than `limit` from the median of the rest (K, 3)."""
+    return np.asarray(np.linalg.norm(smooth - np.median(rest, axis=0), axis=1) > limit)
+
+
+def _smoothed(
+    times: NDArray[np.float64], values: NDArray[np.float64], width: float
+) -> NDArray[np.float64]:
+    """Return the moving average of values (M, 3) over `width` seconds."""
     dt = float(np.median(np.diff(times)))
-    half = int(SMOOTHING / max(dt, 1e-6) / 2)
-    total = np.vstack([np.zeros(3), np.cumsum(gyro, axis=0)])
-    index = np.arange(len(gyro))
-    low, high = np.maximum(index - half, 0), np.minimum(index + half + 1, len(gyro))
+    half = int(width / max(dt, 1e-6) / 2)
+    total = np.vstack([np.zeros(3), np.cumsum(values, axis=0)])
+    index = np.arange(len(values))
+    low, high = np.maximum(index - half, 0), np.minimum(index + half + 1, len(values))
     return np.asarray((total[high] - total[low]) / (high - low)[:, None])
 
 

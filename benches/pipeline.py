@@ -1,30 +1,41 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""From recording to map, as a user runs it: error, speed and memory, one row per scenario.
+"""From recording to map, as a user runs it: error, speed and memory, one row per recording.
 
-Prints a table in Markdown. Every scenario is simulated, mapped by the command line and compared with
-its truth; nothing is read from inside the package, so that any version can be measured.
+Every recording is simulated, mapped by the command line in a process of its own and compared with
+its truth. Prints a table in Markdown and keeps all numbers as JSON.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import os
+import statistics
 import sys
 import tempfile
 import time
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from itertools import product
 from pathlib import Path
 
 import numpy as np
+from scoring import score
 
-HEADER = "| scenario | ATE | ATE in open loop | speed | peak memory |\n|---|---|---|---|---|"
+COLUMNS = (
+    "scene", "head", "seed", "ATE", "ATE in flight", "drift over 10 m (horizontal, vertical)",
+    "map, best possible = 1", "latency", "extrinsics", "speed", "CPU per s recorded", "stages",
+    "peak memory",
+)  # fmt: skip
+STAGES = ("estimate", "map", "report")
+RESULTS = Path(__file__).parent / "results" / "pipeline.json"
 
 
 @dataclass(frozen=True, slots=True)
 class Cost:
-    """Wall time in s and peak resident memory in MB of one command."""
+    """Wall time and processor time in s and peak resident memory in MB of one command."""
 
     seconds: float
+    cpu: float
     megabytes: float
 
 
@@ -41,63 +52,111 @@ def run(*arguments: str | Path) -> Cost:
     _, status, usage = os.wait4(child, 0)
     if code := os.waitstatus_to_exitcode(status):
         sys.exit(f"bentwing {' '.join(map(str, arguments))}: exit code {code}")
-    return Cost(time.perf_counter() - start, usage.ru_maxrss / 1024)
+    seconds = time.perf_counter() - start
+    return Cost(seconds, usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024)
 
 
-def read_tum(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Times (N,) in epoch seconds, positions (N, 3) in m."""
-    rows = [line.split() for line in path.read_text().splitlines() if line and line[0] != "#"]
-    # A float resolves epoch seconds to 240 ns: a micrometre at 5 m/s.
-    values = np.array(rows, dtype=float)
-    return values[:, 0], values[:, 1:4]
+def measure(scene: str, head: str, seed: int, options: argparse.Namespace) -> dict:
+    """Simulate, map and compare one recording."""
+    with tempfile.TemporaryDirectory() as folder:
+        simulated, out = Path(folder) / "recording", Path(folder) / "run"
+        choices = ["--head", head, "--seed", str(seed), "--duration", f"{options.duration:g}"]
+        run("simulate", scene, "-o", simulated, *choices)
+        recording, payload = simulated / "recording.bag", simulated / "payload.yaml"
+        command = [recording, "--payload", payload, "-o", out, "--quiet"]
+        threads = [] if options.threads is None else ["--threads", str(options.threads)]
+        cost = run("map", *command, *threads)
+        record = json.loads((out / "run.json").read_text())
+        return {
+            "scene": scene,
+            "head": head,
+            "seed": seed,
+            "duration": options.duration,
+            "threads": options.threads,
+            "version": record["versions"],
+            "cost": asdict(cost),
+            "timings": record["timings"],
+            "warnings": record["warnings"],
+            "score": score(simulated, out).as_dict(),
+        }
 
 
-def absolute_error(estimate: Path, truth: Path) -> float:
-    """RMS distance in m after the rigid motion that fits the estimate to the truth best."""
-    times, positions = read_tum(estimate)
-    true_times, true_positions = read_tum(truth)
-    common = (times >= true_times[0]) & (times <= true_times[-1])
-    if not common.any():
-        sys.exit(f"{estimate} and {truth} share no time")
-    at = np.stack([np.interp(times[common], true_times, axis) for axis in true_positions.T], axis=1)
-    a, b = positions[common] - positions[common].mean(axis=0), at - at.mean(axis=0)
-    u, _, vt = np.linalg.svd(a.T @ b)
-    handed = np.diag([1.0, 1.0, np.sign(np.linalg.det(u @ vt))])
-    return float(np.sqrt(np.mean(np.sum((a @ u @ handed @ vt - b) ** 2, axis=1))))
-
-
-def only(folder: Path, pattern: str) -> Path:
-    found = sorted(folder.glob(pattern))
-    if len(found) != 1:
-        sys.exit(f"{folder}: expected one file {pattern}, found {[path.name for path in found]}")
-    return found[0]
-
-
-def measure(scenario: str, duration: float, folder: Path) -> str:
-    """Simulate, map and compare one scenario; return its row of the table."""
-    recording, out = folder / scenario, folder / f"{scenario}-run"
-    run("simulate", scenario, "-o", recording, "--duration", f"{duration:g}")
-    payload = recording / "payload.yaml"
-    cost = run("map", only(recording, "*.bag"), "--payload", payload, "-o", out)
-    truth = only(recording, "*truth*.txt")
-    closed = absolute_error(out / "trajectory.txt", truth)
-    open_loop = absolute_error(out / "odometry.txt", truth)
-    return (
-        f"| {scenario} | {100 * closed:.2f} cm | {100 * open_loop:.2f} cm "
-        f"| {duration / cost.seconds:.2f} times real time | {cost.megabytes:.0f} MB |"
+def row(result: dict) -> str:
+    """One line of the table."""
+    found, cost, timings = result["score"], result["cost"], result["timings"]
+    drift = ", ".join(given(found[name], 1e3, "mm/m") for name in ("horizontal", "vertical"))
+    extrinsics = (
+        f"{given(found['extrinsic_rotation'], np.degrees(1.0), '°')}, "
+        f"{given(found['extrinsic_translation'], 1e3, 'mm')}"
     )
+    shares = ", ".join(f"{name} {timings[name] / timings['total']:.0%}" for name in STAGES)
+    cells = [
+        result["scene"],
+        result["head"],
+        str(result["seed"]),
+        given(found["ate"], 100, "cm"),
+        given(found["ate_flight"], 100, "cm"),
+        drift,
+        f"{found['map_ratio']:.2f}",
+        given(found["latency"], 1e3, "ms"),
+        extrinsics,
+        f"{result['duration'] / cost['seconds']:.2f} x real time",
+        f"{cost['cpu'] / result['duration']:.2f} s",
+        shares,
+        f"{cost['megabytes']:.0f} MB",
+    ]
+    return f"| {' | '.join(cells)} |"
+
+
+def given(value: float | None, factor: float, unit: str) -> str:
+    """The value in a unit, or a dash where there is none."""
+    return "-" if value is None else f"{value * factor:.2f} {unit}"
+
+
+def medians(results: list[dict]) -> dict:
+    """The middle of several seeds of one scene and head."""
+    middle = {**results[0], "seed": f"median of {len(results)}"}
+    for part in ("score", "cost", "timings"):
+        keys = results[0][part]
+        values = {key: [r[part].get(key) for r in results] for key in keys}
+        middle[part] = {
+            key: None if None in found else statistics.median(found)
+            for key, found in values.items()
+        }
+    return middle
+
+
+def keep(results: list[dict], path: Path) -> None:
+    """Append to what earlier runs have left."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    earlier = json.loads(path.read_text()) if path.exists() else []
+    when = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
+    path.write_text(json.dumps([*earlier, {"when": when, "results": results}], indent=1))
 
 
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("scenarios", nargs="*", default=["courtyard", "office"])
+    parser.add_argument("positional", nargs="*", metavar="SCENE", help="the same as --scenes")
+    parser.add_argument("--scenes", nargs="+", default=[])
+    parser.add_argument("--heads", nargs="+", default=["hokuyo-spin"])
+    parser.add_argument("--seeds", nargs="+", type=int, default=[0])
     parser.add_argument("--duration", type=float, default=60.0, help="of each flight, in s")
-    arguments = parser.parse_args()
-    print(HEADER)
-    with tempfile.TemporaryDirectory() as folder:
-        for scenario in arguments.scenarios:
-            print(measure(scenario, arguments.duration, Path(folder)), flush=True)
+    parser.add_argument("--threads", type=int, help="of the estimator; default: all cores")
+    parser.add_argument("--json", type=Path, default=RESULTS, help="default: %(default)s")
+    options = parser.parse_args()
+    scenes = [*options.positional, *options.scenes] or ["courtyard", "office"]
+    print(f"| {' | '.join(COLUMNS)} |\n|{'---|' * len(COLUMNS)}")
+    results = []
+    for scene, head in product(scenes, options.heads):
+        of_head = []
+        for seed in options.seeds:
+            of_head.append(measure(scene, head, seed, options))
+            print(row(of_head[-1]), flush=True)
+        if len(of_head) > 1:
+            print(row(medians(of_head)), flush=True)
+        results += of_head
+    keep(results, options.json)
 
 
 if __name__ == "__main__":

@@ -3,6 +3,10 @@
 
 from __future__ import annotations
 
+import fcntl
+import functools
+import os
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +16,8 @@ from rosbags.rosbag1 import Writer as Rosbag1Writer
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Rosbag2Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from bentwing.simulate import Scenario, simulate
 
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 
@@ -181,5 +187,43 @@ def head_entries():
                 wrapped = (angle + np.pi) % (2 * np.pi) - np.pi
                 entries.append(("/encoder", t, messages.joint(t, wrapped)))
         return sorted(entries, key=lambda entry: entry[1])
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def made_once(tmp_path_factory):
+    """Return a maker of folders that are filled once, also where several workers want them."""
+    base = tmp_path_factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        base = base.parent
+
+    def made(name, fill):
+        folder, finished = base / name, base / f"{name}.finished"
+        with locked(base / f"{name}.lock"):
+            if not finished.exists():
+                fill(folder)
+                finished.touch()
+        return folder
+
+    return made
+
+
+@contextmanager
+def locked(path):
+    with path.open("w") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        yield
+
+
+@pytest.fixture(scope="session")
+def simulated(made_once):
+    """Return a maker of simulated recordings: the folder with recording, payload and truth."""
+
+    @functools.cache
+    def make(scene, duration, *, seed=0, head="hokuyo-spin", events=()):
+        name = "-".join(["sim", scene, head, f"{duration:g}", str(seed), *events])
+        scenario = Scenario(scene=scene, head=head, duration=duration, seed=seed, events=events)
+        return made_once(name, lambda folder: simulate(scenario, folder))
 
     return make

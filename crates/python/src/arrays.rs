@@ -64,6 +64,21 @@ pub(crate) fn finite<'a>(
     }
 }
 
+/// Encoder angles of the points: needed with a motor, without meaning and optional without one.
+pub(crate) fn angles<'a>(
+    array: Option<&'a PyReadonlyArray1<'_, f64>>,
+    n: usize,
+    has_motor: bool,
+) -> PyResult<&'a [f64]> {
+    match array {
+        Some(array) => finite("angles", array, n),
+        None if has_motor && n > 0 => Err(PyValueError::new_err(
+            "angles: expected the motor's angle of every point, as globals have a motor, got None",
+        )),
+        None => Ok(&[]),
+    }
+}
+
 /// As [`finite`], and non-decreasing.
 pub(crate) fn times<'a>(
     name: &str,
@@ -85,6 +100,24 @@ pub(crate) fn times<'a>(
     }
 }
 
+/// A finite number.
+pub(crate) fn finite_number(name: &str, value: f64) -> PyResult<f64> {
+    if value.is_finite() {
+        return Ok(value);
+    }
+    let message = format!("{name}: expected a finite number, got {value}");
+    Err(PyValueError::new_err(message))
+}
+
+/// A finite three-vector.
+pub(crate) fn finite_vector(name: &str, value: [f64; 3]) -> PyResult<Vector3<f64>> {
+    if value.iter().all(|v| v.is_finite()) {
+        return Ok(value.into());
+    }
+    let message = format!("{name}: expected finite numbers, got {value:?}");
+    Err(PyValueError::new_err(message))
+}
+
 /// Three-vectors of the rows.
 pub(crate) fn vectors(rows: &[[f64; 3]]) -> Vec<Vector3<f64>> {
     rows.iter().map(|r| Vector3::from(*r)).collect()
@@ -93,7 +126,9 @@ pub(crate) fn vectors(rows: &[[f64; 3]]) -> Vec<Vector3<f64>> {
 /// A unit quaternion from x, y, z, w; refuses norms that are not one.
 pub(crate) fn unit_quaternion(name: &str, q: &[f64; 4]) -> PyResult<UnitQuaternion<f64>> {
     let q = Quaternion::new(q[3], q[0], q[1], q[2]);
-    if (q.norm() - 1.0).abs() > 1e-3 {
+    // Written so that NaN, which compares with nothing, is refused as well.
+    let is_unit = (q.norm() - 1.0).abs() <= 1e-3;
+    if !is_unit {
         let message = format!("{name}: expected a unit quaternion, got norm {}", q.norm());
         return Err(PyValueError::new_err(message));
     }

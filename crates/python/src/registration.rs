@@ -8,9 +8,10 @@ use bentwing_registration::{FixedView as RustView, GlobalPrior, Initial, N_GLOBA
 use bentwing_surfels::{Points, SurfelSet};
 use nalgebra::Matrix3;
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, ToPyArray};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::arrays::{finite, finite_rows, times, to_array2};
+use crate::arrays::{angles as angles_of, finite_rows, times, to_array2};
 use crate::errors::{in_pool, solve_error};
 use crate::trajectory::{Globals, Imu, Samples};
 
@@ -24,6 +25,7 @@ pub(crate) struct SurfelSettings {
     min_planarity: f64,
     min_width_ratio: f64,
     min_width: f64,
+    max_rate: f64,
 }
 
 #[derive(FromPyObject)]
@@ -144,10 +146,8 @@ pub(crate) fn extract_surfels(
 ) -> PyResult<Surfels> {
     let points = finite_rows("points", &points)?;
     let stamps = times("stamps", &stamps, points.len())?;
-    let angles = match &angles {
-        Some(a) => finite("angles", a, points.len())?,
-        None => &[],
-    };
+    let has_motor = globals.0.head.motor.is_some();
+    let angles = angles_of(angles.as_ref(), points.len(), has_motor)?;
     let settings = bentwing_surfels::Settings {
         voxel_size: settings.voxel_size,
         n_levels: settings.n_levels,
@@ -157,6 +157,7 @@ pub(crate) fn extract_surfels(
         min_planarity: settings.min_planarity,
         min_width_ratio: settings.min_width_ratio,
         min_width: settings.min_width,
+        max_rate: settings.max_rate,
     };
     let points = Points {
         points,
@@ -323,8 +324,15 @@ pub(crate) fn register_window(
     settings: RegistrationSettings,
     threads: usize,
 ) -> PyResult<Registration> {
-    let information: &[[f64; N_GLOBALS]] = finite_rows("information", &information)?;
-    let information = core::GlobalMatrix::from_fn(|r, c| information[r][c]);
+    let rows: &[[f64; N_GLOBALS]] = finite_rows("information", &information)?;
+    if rows.len() != N_GLOBALS {
+        let message = format!(
+            "information: expected shape ({N_GLOBALS}, {N_GLOBALS}), got ({}, {N_GLOBALS})",
+            rows.len()
+        );
+        return Err(PyValueError::new_err(message));
+    }
+    let information = core::GlobalMatrix::from_fn(|r, c| rows[r][c]);
     let sets: Vec<Arc<SurfelSet>> = surfels.iter().map(|s| Arc::clone(&s.0)).collect();
     let views: Vec<&RustView> = views.iter().map(|v| &v.0).collect();
     let imu = imu.map(|imu| &imu.0);

@@ -10,7 +10,9 @@ use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, ToPyArray};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::arrays::{finite_rows, times, to_array2, unit_quaternion, vectors};
+use crate::arrays::{
+    finite_number, finite_rows, finite_vector, times, to_array2, unit_quaternion, vectors,
+};
 use crate::errors::in_pool;
 
 /// Poses of the IMU in the map at a uniform rate.
@@ -32,6 +34,7 @@ impl Samples {
             .iter()
             .map(|q| unit_quaternion("quats_xyzw", q))
             .collect();
+        let start = finite_number("start", start)?;
         Trajectory::new(start, dt, positions, rotations?)
             .map(Self)
             .map_err(|e| PyValueError::new_err(e.to_string()))
@@ -93,14 +96,23 @@ impl Samples {
     }
 
     /// Position (3,), m, at `time`.
-    fn position_at<'py>(&self, py: Python<'py>, time: f64) -> Bound<'py, PyArray1<f64>> {
-        vector(py, &self.0.pose(time).p)
+    fn position_at<'py>(&self, py: Python<'py>, time: f64) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let time = finite_number("time", time)?;
+        Ok(vector(py, &self.0.pose(time).p))
     }
 
     /// These samples with those from `first` on replaced by `newer`.
     fn replaced(&self, first: usize, newer: &Self) -> PyResult<Self> {
         if first > self.0.len() {
             let message = format!("first: expected at most {}, got {first}", self.0.len());
+            return Err(PyValueError::new_err(message));
+        }
+        if newer.0.dt() != self.0.dt() {
+            let message = format!(
+                "newer: expected samples every {} s as here, got {} s",
+                self.0.dt(),
+                newer.0.dt()
+            );
             return Err(PyValueError::new_err(message));
         }
         let positions = [&self.0.positions()[..first], newer.0.positions()].concat();
@@ -112,7 +124,13 @@ impl Samples {
 
     /// These samples extended to `until` by the IMU, or at constant velocity without one; and the
     /// number of samples for which the IMU had a gap.
-    fn extended(&self, imu: Option<&Imu>, globals: &Globals, until: f64) -> (Self, usize) {
+    fn extended(
+        &self,
+        imu: Option<&Imu>,
+        globals: &Globals,
+        until: f64,
+    ) -> PyResult<(Self, usize)> {
+        let until = finite_number("until", until)?;
         let mut trajectory = self.0.clone();
         let n_blind = match imu {
             None => {
@@ -131,7 +149,7 @@ impl Samples {
                 )
             }
         };
-        (Self(trajectory), n_blind)
+        Ok((Self(trajectory), n_blind))
     }
 
     /// Lidar points (N, 3) placed in the map.
@@ -147,11 +165,8 @@ impl Samples {
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let points = finite_rows("points", &points)?;
         let stamps = times("stamps", &stamps, points.len())?;
-        let angles = match &angles {
-            Some(a) => crate::arrays::finite("angles", a, points.len())?,
-            None => &[],
-        };
         let head = &globals.0.head;
+        let angles = crate::arrays::angles(angles.as_ref(), points.len(), head.motor.is_some())?;
         let placed = in_pool(py, threads, || {
             bentwing_surfels::place_points(points, stamps, angles, &self.0, head)
         })?;
@@ -173,7 +188,7 @@ impl Imu {
     ) -> PyResult<Self> {
         let gyro = vectors(finite_rows("gyro", &gyro)?);
         let accel = vectors(finite_rows("accel", &accel)?);
-        let stamps = times("times", &stamps, gyro.len())?.to_vec();
+        let stamps = times("stamps", &stamps, gyro.len())?.to_vec();
         if accel.len() != gyro.len() {
             let message = format!("accel: expected {} rows, got {}", gyro.len(), accel.len());
             return Err(PyValueError::new_err(message));
@@ -196,10 +211,8 @@ struct Transform([f64; 3], [f64; 4]);
 impl Transform {
     fn isometry(&self, name: &str) -> PyResult<Isometry3<f64>> {
         let q = unit_quaternion(name, &self.1)?;
-        Ok(Isometry3::from_parts(
-            Translation3::from(Vector3::from(self.0)),
-            q,
-        ))
+        let t = finite_vector(name, self.0)?;
+        Ok(Isometry3::from_parts(Translation3::from(t), q))
     }
 }
 
@@ -225,11 +238,11 @@ impl Globals {
         let motor = match (motor_axis, T_motor_lidar) {
             (None, None) => None,
             (Some(axis), Some(T)) => {
-                let axis = Vector3::from(axis).try_normalize(1e-9);
+                let axis = finite_vector("motor_axis", axis)?.try_normalize(1e-9);
                 let zero_axis = || PyValueError::new_err("motor_axis: expected a non-zero vector");
                 Some(Motor {
                     axis: axis.ok_or_else(zero_axis)?,
-                    zero: encoder_zero,
+                    zero: finite_number("encoder_zero", encoder_zero)?,
                     T_motor_lidar: T.isometry("T_motor_lidar")?,
                 })
             }
@@ -240,14 +253,14 @@ impl Globals {
         };
         let head = Head {
             T_imu_base: T_imu_base.isometry("T_imu_base")?,
-            latency,
+            latency: finite_number("latency", latency)?,
             motor,
         };
         Ok(Self(RustGlobals {
             head,
-            gyro_bias: gyro_bias.into(),
-            accel_bias: accel_bias.into(),
-            gravity: gravity.into(),
+            gyro_bias: finite_vector("gyro_bias", gyro_bias)?,
+            accel_bias: finite_vector("accel_bias", accel_bias)?,
+            gravity: finite_vector("gravity", gravity)?,
         }))
     }
 

@@ -10,6 +10,9 @@ use crate::{Moments, SurfelSet, place_points, sym3};
 const KEY_BITS: u32 = 21;
 const KEY_OFFSET: i64 = 1 << (KEY_BITS - 1);
 
+/// The budget of a shorter stretch is that of this one, s.
+const MIN_DURATION: f64 = 0.1;
+
 /// What makes a surfel.
 #[derive(Clone, Debug)]
 pub struct Settings {
@@ -30,6 +33,8 @@ pub struct Settings {
     /// Least `√λ2` in units of the voxel size; rejects single scan lines, whose normal is free
     /// to turn about the line.
     pub min_width: f64,
+    /// Most surfels per second of data.
+    pub max_rate: f64,
 }
 
 /// Time-stamped points of the lidar.
@@ -68,6 +73,7 @@ pub fn extract(
         level_starts: vec![0],
         ..SurfelSet::default()
     };
+    let mut ranks = Vec::new();
     let mut cells = runs(&placed, &points, &origin, settings);
     for level in 0..settings.n_levels {
         if level > 0 {
@@ -78,7 +84,7 @@ pub fn extract(
         cells = merge(&cells, settings);
         let size = settings.voxel_size * f64::from(1u32 << level);
         for cell in &cells {
-            push_surfel(
+            if push_surfel(
                 &mut set,
                 &cell.moments,
                 &origin,
@@ -86,12 +92,58 @@ pub fn extract(
                 trajectory,
                 head,
                 settings,
-            );
+            ) {
+                ranks.push(rank(cell.key, level));
+            }
         }
         set.level_starts.push(set.len());
         set.voxel_sizes.push(size);
     }
-    set
+    let duration = points
+        .stamps
+        .last()
+        .zip(points.stamps.first())
+        .map_or(0.0, |(b, a)| b - a);
+    limit(
+        set,
+        &ranks,
+        (settings.max_rate * duration.max(MIN_DURATION)) as usize,
+    )
+}
+
+/// Keeps at most `budget` surfels: levels with few keep all of theirs, the others share the rest.
+///
+/// Voxels are kept in the order of their ranks, so that a voxel kept now is kept when it is seen
+/// again, and surfels do not lose their counterparts.
+fn limit(set: SurfelSet, ranks: &[u64], budget: usize) -> SurfelSet {
+    if set.len() <= budget {
+        return set;
+    }
+    let mut by_size: Vec<usize> = (0..set.n_levels()).collect();
+    by_size.sort_by_key(|&l| set.level(l).len());
+    let mut keep = vec![true; set.len()];
+    let mut left = budget;
+    for (done, &level) in by_size.iter().enumerate() {
+        let share = left / (set.n_levels() - done);
+        let range = set.level(level);
+        left -= share.min(range.len());
+        if range.len() > share {
+            let mut sorted: Vec<u64> = ranks[range.clone()].to_vec();
+            let (_, &mut threshold, _) = sorted.select_nth_unstable(share);
+            for i in range {
+                keep[i] = ranks[i] < threshold;
+            }
+        }
+    }
+    set.filtered(&keep)
+}
+
+/// A fixed pseudo-random number for each voxel (the finalizer of SplitMix64).
+fn rank(key: u64, level: usize) -> u64 {
+    let mut x = key ^ (level as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    x = (x ^ (x >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    x = (x ^ (x >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    x ^ (x >> 31)
 }
 
 /// Consecutive points in the same voxel, which a scan line has many of, become one cell at once.
@@ -144,6 +196,7 @@ fn belongs(earlier: &Moments, later: &Moments, settings: &Settings) -> bool {
     next_start - end <= settings.max_gap && next_end - start <= settings.max_span
 }
 
+/// Adds the surfel of a cell, if it is one; returns whether it is.
 fn push_surfel(
     set: &mut SurfelSet,
     moments: &Moments,
@@ -152,9 +205,9 @@ fn push_surfel(
     trajectory: &Trajectory,
     head: &Head,
     settings: &Settings,
-) {
+) -> bool {
     if moments.n() < settings.min_points {
-        return;
+        return false;
     }
     let covariance = moments.covariance();
     let eigen = sym3::eigen(&covariance);
@@ -164,7 +217,7 @@ fn push_surfel(
         && l2 > settings.min_width_ratio * l3
         && l2 > (settings.min_width * size).powi(2);
     if !is_surface {
-        return;
+        return false;
     }
     let (stamp, angle) = (moments.mean_time(), moments.mean_angle());
     let pose = trajectory.pose(stamp - head.latency);
@@ -185,6 +238,7 @@ fn push_surfel(
     set.stamps.push(stamp);
     set.angles.push(angle);
     set.n_points.push(moments.n());
+    true
 }
 
 fn pack(p: &[f64; 3], size: f64) -> u64 {

@@ -44,4 +44,27 @@ impl SurfelSet {
     pub fn level(&self, level: usize) -> std::ops::Range<usize> {
         self.level_starts[level]..self.level_starts[level + 1]
     }
+
+    /// The surfels that `keep` marks.
+    pub(crate) fn filtered(self, keep: &[bool]) -> Self {
+        fn kept<T>(values: Vec<T>, keep: &[bool]) -> Vec<T> {
+            values
+                .into_iter()
+                .zip(keep)
+                .filter(|(_, k)| **k)
+                .map(|(v, _)| v)
+                .collect()
+        }
+        let count = |end: &usize| keep[..*end].iter().filter(|k| **k).count();
+        Self {
+            level_starts: self.level_starts.iter().map(count).collect(),
+            means: kept(self.means, keep),
+            covariances: kept(self.covariances, keep),
+            normals: kept(self.normals, keep),
+            stamps: kept(self.stamps, keep),
+            angles: kept(self.angles, keep),
+            n_points: kept(self.n_points, keep),
+            voxel_sizes: self.voxel_sizes,
+        }
+    }
 }

@@ -11,6 +11,8 @@ import numpy as np
 from bentwing.recording.batches import EncoderBatch, ImuBatch, LidarBatch
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from bentwing.recording.batches import Batch
@@ -37,8 +39,12 @@ class BatchBuffer:
         if isinstance(batch, EncoderBatch) or len(batch.times) == 0:
             return
         if isinstance(batch, LidarBatch):
+            _require_usable(batch.times, points=batch.points)
+            _require_order(self._lidar, batch)
             self._lidar.append(batch)
         else:
+            _require_usable(batch.times, gyro=batch.gyro, accel=batch.accel)
+            _require_order(self._imu, batch)
             self._imu.append(batch)
 
     @property
@@ -87,3 +93,20 @@ class BatchBuffer:
         """Drop batches that end before a time, s."""
         self._lidar = [b for b in self._lidar if b.times[-1] >= before]
         self._imu = [b for b in self._imu if b.times[-1] >= before]
+
+
+def _require_usable(times: NDArray[np.float64], **fields: NDArray[np.float64]) -> None:
+    """Refuse what is not finite here, where the batch is known; at rest nothing later would."""
+    for name, values in {"times": times, **fields}.items():
+        finite = np.isfinite(values)
+        if not finite.all():
+            row = int(np.argmin(finite if finite.ndim == 1 else finite.all(axis=1)))
+            msg = f"{name}: row {row} of a batch at {times[0]:.3f} s is not finite: {values[row]}"
+            raise ValueError(msg)
+
+
+def _require_order(held: Sequence[LidarBatch | ImuBatch], batch: LidarBatch | ImuBatch) -> None:
+    before = held[-1].times[-1] if held else -np.inf
+    if batch.times[0] < before or np.any(np.diff(batch.times) < 0):
+        msg = f"times: must not decrease, but a batch at {batch.times[0]:.3f} s does, after {before:.3f} s"
+        raise ValueError(msg)

@@ -46,6 +46,7 @@ class Continuous:
         self._payload = payload
         self._mount = described_mount(payload)
         self._threads = threads or 0
+        self._sliding = self.settings
         self._core = CoreSettings.of(self.settings.registration, payload, DT)
         self._buffer = BatchBuffer()
         self._start: Start | None = None
@@ -77,10 +78,11 @@ class Continuous:
         NotEnoughDataError
             There is none yet.
         """
-        if self._pass is None or not self._pass.windows:
-            msg = f"less than {self.settings.shift:g} s of lidar points; nothing can be estimated"
+        done = self._pass
+        if done is None or not done.windows or done.end - self._first < self._sliding.shift:
+            msg = f"less than {self._sliding.shift:g} s of lidar points; nothing can be estimated"
             raise NotEnoughDataError(msg)
-        return self._estimate(self._pass)
+        return self._estimate(done)
 
     def _advance(self, *, finishing: bool) -> None:
         ready = self._ready_until(finishing=finishing)
@@ -108,6 +110,7 @@ class Continuous:
         self._first = lidar[0]
         if imu is None or self._payload.imu is None:
             self._start = level_start(lidar[0])
+            self._sliding = self.settings.without_imu()
         else:
             # The trajectory begins with the later of both sensors.
             self._first = max(lidar[0], imu[0] + 2 * DT)
@@ -143,7 +146,7 @@ class Continuous:
             samples,
             slow,
             prior,
-            self.settings,
+            self._sliding,
             self._core,
             threads=self._threads,
             resting=start.static is not None,
@@ -173,17 +176,19 @@ class Continuous:
         if current is None or start is None:
             return False
         rehearsed = current.end - start.hold >= self.settings.rehearsal
+        if self._rehearsing and self._sliding is not self.settings:
+            self._rehearsing = False  # there is nothing to learn
         if self._rehearsing and (rehearsed or (finishing and ready - current.end < DT)):
             self._rehearsing = False
             self._pass = current = self._new_pass(start, current)
-        end = current.end + self.settings.shift
+        end = current.end + self._sliding.shift
         if end > ready:
             if not finishing or ready - current.end < DT:
                 return False
             end = ready
         current.step(self._buffer, end)
         if not self._rehearsing:
-            self._buffer.forget(end - self.settings.window - 1.0)
+            self._buffer.forget(end - self._sliding.window - 1.0)
         return True
 
     def _estimate(self, last: OdometryPass) -> Estimate:

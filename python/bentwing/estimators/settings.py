@@ -3,11 +3,13 @@
 
 from __future__ import annotations
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, field_validator
+
+from bentwing.estimators.slow_states import SLICES
 
 
 class _Section(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
 class SurfelSettings(_Section):
@@ -23,6 +25,7 @@ class SurfelSettings(_Section):
     min_width: float = Field(
         0.05, ge=0, description="sqrt(l2) in voxels; rejects single scan lines"
     )
+    max_rate: float = Field(4000.0, gt=0, description="most surfels per second of data")
 
 
 class RegistrationSettings(_Section):
@@ -49,6 +52,12 @@ class ContinuousSettings(_Section):
 
     window: float = Field(5.0, gt=0, description="length, s")
     shift: float = Field(1.0, gt=0, description="new data per step, s")
+    window_without_imu: float = Field(2.0, gt=0, description="length without an IMU, s")
+    shift_without_imu: float = Field(
+        0.2,
+        gt=0,
+        description="new data per step without an IMU, s: how long velocities are extrapolated",
+    )
     rehearsal: float = Field(
         20.0,
         ge=0,
@@ -62,3 +71,18 @@ class ContinuousSettings(_Section):
     )
     surfels: SurfelSettings = SurfelSettings()
     registration: RegistrationSettings = RegistrationSettings()
+
+    @field_validator("frozen")
+    @classmethod
+    def _known_states(cls, names: tuple[str, ...]) -> tuple[str, ...]:
+        unknown = sorted(set(names) - SLICES.keys())
+        if unknown:
+            msg = f"unknown states {unknown}; choose from {list(SLICES)}"
+            raise ValueError(msg)
+        return names
+
+    def without_imu(self) -> ContinuousSettings:
+        """Return the settings with the window that suits a lidar alone."""
+        return self.model_copy(
+            update={"window": self.window_without_imu, "shift": self.shift_without_imu}
+        )

@@ -15,6 +15,7 @@ fn settings() -> Settings {
         min_planarity: 0.3,
         min_width_ratio: 0.03,
         min_width: 0.05,
+        max_rate: f64::INFINITY,
     }
 }
 
@@ -133,4 +134,36 @@ proptest! {
         prop_assert_eq!(coarser(pack(&p, 0.4)), pack(&p, 0.8));
         prop_assert_eq!(coarser(coarser(pack(&p, 0.4))), pack(&p, 1.6));
     }
+}
+
+#[test]
+fn a_budget_keeps_the_same_voxels_of_a_surface_seen_twice() {
+    let (trajectory, head) = (moving(), head());
+    let (points, stamps) = wall(&trajectory, &head);
+    let points = Points {
+        points: &points,
+        stamps: &stamps,
+        angles: &[],
+    };
+    let all = extract(points, &trajectory, &head, &settings());
+    let few = extract(
+        points,
+        &trajectory,
+        &head,
+        &Settings {
+            max_rate: 200.0,
+            ..settings()
+        },
+    );
+    let fewer = extract(
+        points,
+        &trajectory,
+        &head,
+        &Settings {
+            max_rate: 100.0,
+            ..settings()
+        },
+    );
+    assert!(few.len() <= 40 && few.len() < all.len() && fewer.len() < few.len());
+    assert!(fewer.means.iter().all(|m| few.means.contains(m)));
 }

@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""What every estimator is fed in its contract: the first seconds of a flight through an office."""
+
+from __future__ import annotations
+
+import functools
+from collections import Counter
+from types import SimpleNamespace
+
+import pytest
+
+from bentwing import estimators
+from bentwing.estimators.settings import ContinuousSettings
+from bentwing.preprocess import preprocess
+from bentwing.recording import LidarBatch, Payload, Recording
+
+LENGTH = 11.0  # s; the rest at the start is over after four
+THINNING = 3  # every third point, for speed
+
+# Settings that make each estimator quick and still go through all of its parts.
+QUICK = {"continuous": ContinuousSettings(window=3.0, rehearsal=4.0, registration={"max_outer": 2})}
+
+
+@pytest.fixture(scope="session")
+def head(simulated):
+    """The payload and the batches of the flight."""
+    folder = simulated("office", 22.0)
+    payload = Payload.load(folder / "payload.yaml")
+    with Recording(folder / "recording.bag", payload) as recording:
+        stream = preprocess(recording.batches(0.0, LENGTH), payload, Counter())
+        batches = [
+            b.where(slice(None, None, THINNING)) if isinstance(b, LidarBatch) else b for b in stream
+        ]
+    return SimpleNamespace(payload=payload, batches=batches)
+
+
+@pytest.fixture(scope="session")
+def quick():
+    """Settings by the name of the estimator."""
+    return QUICK
+
+
+@pytest.fixture(params=sorted(QUICK))
+def name(request):
+    """Of the estimator."""
+    return request.param
+
+
+@pytest.fixture(scope="session")
+def run(head):
+    """Feed an estimator and return its result."""
+
+    def feed(name, *, batches=None, threads=1, settings=None):
+        engine = estimators.create(name, head.payload, settings or QUICK[name], threads)
+        for batch in head.batches if batches is None else batches:
+            engine.feed(batch)
+        return engine.result()
+
+    return feed
+
+
+@pytest.fixture(scope="session")
+def plain_run(run):
+    """The result of an estimator with one thread, computed once."""
+    return functools.cache(lambda name: run(name))

@@ -1,2 +1,71 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
 """Accurate trajectories and 3D maps from lidars that move on their carrier, without GNSS."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from bentwing.errors import (
+        BentwingError,
+        DivergedError,
+        EstimationError,
+        InputError,
+        NotEnoughDataError,
+        PayloadError,
+        RecordingError,
+        SingularSystemError,
+        UsageError,
+    )
+    from bentwing.pipeline import map_recording
+    from bentwing.recording import Payload, Recording
+    from bentwing.registration import WindowResult, register_window
+    from bentwing.run import Run
+    from bentwing.trajectory import Trajectory
+
+    __version__: str
+
+__all__ = [
+    "BentwingError",
+    "DivergedError",
+    "EstimationError",
+    "InputError",
+    "NotEnoughDataError",
+    "Payload",
+    "PayloadError",
+    "Recording",
+    "RecordingError",
+    "Run",
+    "SingularSystemError",
+    "Trajectory",
+    "UsageError",
+    "WindowResult",
+    "__version__",
+    "map_recording",
+    "register_window",
+]
+
+# Where the names live; imported when first asked for, so that `import bentwing` costs nothing.
+_HOMES = {
+    "map_recording": "pipeline",
+    "Payload": "recording",
+    "Recording": "recording",
+    "WindowResult": "registration",
+    "register_window": "registration",
+    "Run": "run",
+    "Trajectory": "trajectory",
+}
+
+
+def __getattr__(name: str) -> object:
+    if name == "__version__":
+        return import_module("bentwing.run_record").bentwing_version()
+    if name not in __all__:
+        msg = f"module {__name__!r} has no attribute {name!r}"
+        raise AttributeError(msg)
+    return getattr(import_module(f"bentwing.{_HOMES.get(name, 'errors')}"), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -10,6 +10,7 @@ import numpy as np
 
 from bentwing.map.sample import MapSample
 from bentwing.recording import ImuBatch
+from bentwing.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -36,8 +37,16 @@ class Run:
     spin_times: list[float] = field(default_factory=list)
     spin_rates: list[float] = field(default_factory=list)
 
+    @property
+    def trajectory(self) -> Trajectory:
+        """Poses of the IMU in the map; empty before there are any."""
+        return _NO_TRAJECTORY if self.estimate is None else self.estimate.trajectory
+
     def watch(self, batch: Batch) -> None:
         """Note the rate of turn of an IMU batch."""
         if isinstance(batch, ImuBatch) and len(batch.times):
             self.spin_times.append(float(batch.times.mean()))
             self.spin_rates.append(float(np.median(np.linalg.norm(batch.gyro, axis=1))))
+
+
+_NO_TRAJECTORY = Trajectory(np.empty(0), np.empty((0, 3)), np.empty((0, 4)))

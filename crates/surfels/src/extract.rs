@@ -138,7 +138,7 @@ fn limit(set: SurfelSet, ranks: &[u64], budget: usize) -> SurfelSet {
     set.filtered(&keep)
 }
 
-/// A fixed pseudo-random number for each voxel (the finalizer of SplitMix64).
+/// A fixed pseudo-random number for each voxel (the finalizer of `SplitMix64`).
 fn rank(key: u64, level: usize) -> u64 {
     let mut x = key ^ (level as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15);
     x = (x ^ (x >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);

@@ -18,7 +18,9 @@ def map_command(
     payload: Annotated[
         Path | None, typer.Option(help="payload.yaml, the description of the sensor head.")
     ] = None,
-    estimator: Annotated[str, typer.Option(help="continuous, kalman or ndt.")] = "continuous",
+    estimator: Annotated[
+        str, typer.Option(help="continuous; kalman and ndt are not in this version.")
+    ] = "continuous",
     map_format: Annotated[str, typer.Option(help="laz, las, ply, pcd or e57.")] = "laz",
     map_spacing: Annotated[
         float, typer.Option(help="Keep one point per voxel of this edge in metres; 0 keeps all.")

@@ -239,7 +239,8 @@ def _warnings(last: OdometryPass) -> list[str]:
             f"{len(degenerate)} of {len(last.windows)} windows see too little in some direction "
             f"(first at {degenerate[0]:.1f} s): the IMU carries the estimate there"
         )
-    if last.n_blind:
+    # The trajectory is carried a little beyond the last stamps, always without data.
+    if last.n_blind * DT > 2 * MARGIN:
         sentences.append(
             f"{last.n_blind * DT:.2f} s have no inertial data: the motion went on at constant velocity there"
         )

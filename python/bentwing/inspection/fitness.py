@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing.inspection.planar import level_share
+from bentwing.inspection.planar import MIN_CORRELATION, level_share
 from bentwing.preprocess import find_static_start
 from bentwing.recording import imu_units, problems
 from bentwing.recording.topics import LASER_SCAN, MULTI_ECHO
@@ -92,7 +92,10 @@ def judge(recording: Recording, samples: Samples, *, has_payload: bool) -> Judge
         warnings += _imu_rate(recording, samples) + _start_warnings(static)
         if (mirrored := imu_units.mirrored_axis(judged[0], *imu_units.in_si(*judged))) is not None:
             warnings.append(f"{recording.imu_topic}: {mirrored}")
-    defects += _planar_defects(recording, samples)
+    planar = _planar_defects(recording, samples)
+    if planar and not has_payload and not _scans_turn(recording, samples, gyro):
+        planar, warnings = [], [*warnings, _unknown_plane(recording)]
+    defects += planar
     defects += _mount_defects(recording, has_payload=has_payload)
     return Judgement(defects, warnings, static, gyro)
 
@@ -116,16 +119,23 @@ def _time_defects(recording: Recording) -> list[str]:
 
 def _mirrored(recording: Recording, samples: Samples, gyro: NDArray[np.float64]) -> list[str]:
     """Compare the turn of a level 2D lidar from scan to scan with the gyro about its normal."""
-    if samples.scan_turns is None:
-        return []
-    rates = gyro @ _R_imu_lidar(recording)[:, 2]
-    if not samples.scan_turns.gyro_is_mirrored(samples.imu_times, rates - np.median(rates)):
+    agreement = _scan_agreement(recording, samples, gyro)
+    if agreement is None or agreement > -MIN_CORRELATION:
         return []
     return [
         f"{recording.imu_topic}: the gyro turns against the scans of {recording.lidar_topic} about "
         "the scan plane's normal, so one axis is mirrored; flip the sign of the gyro's axis along "
         "the normal in the driver, or, if the lidar is mounted upside down, say so in T_imu_lidar"
     ]
+
+
+def _scan_agreement(
+    recording: Recording, samples: Samples, gyro: NDArray[np.float64]
+) -> float | None:
+    if samples.scan_turns is None:
+        return None
+    rates = gyro @ _R_imu_lidar(recording)[:, 2]
+    return samples.scan_turns.agreement(samples.imu_times, rates - np.median(rates))
 
 
 def _imu_rate(recording: Recording, samples: Samples) -> list[str]:
@@ -157,6 +167,21 @@ def _planar_defects(recording: Recording, samples: Samples) -> list[str]:
         f"{recording.lidar_topic}: a 2D lidar whose scan plane stays level sees one slice of the "
         "surroundings and cannot make a 3D map; spin or nod the lidar, or use a 2D SLAM program"
     ]
+
+
+def _scans_turn(recording: Recording, samples: Samples, gyro: NDArray[np.float64]) -> bool:
+    """Whether the scans turn with or against the gyro, which a level plane does in any mount."""
+    if not len(samples.imu_times):
+        return True
+    agreement = _scan_agreement(recording, samples, gyro)
+    return agreement is not None and abs(agreement) >= MIN_CORRELATION
+
+
+def _unknown_plane(recording: Recording) -> str:
+    return (
+        f"{recording.lidar_topic}: whether the scan plane sweeps space cannot be told without "
+        "knowing how the lidar is mounted; give the payload.yaml with --payload"
+    )
 
 
 def _mount_defects(recording: Recording, *, has_payload: bool) -> list[str]:

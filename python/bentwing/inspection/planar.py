@@ -63,8 +63,11 @@ class ScanTurns:
             scan = times == time
             profile[bins[scan]] = ranges[scan]
 
-    def gyro_is_mirrored(self, times: NDArray[np.float64], rates: NDArray[np.float64]) -> bool:
-        """Whether a gyro axis turns against the scans.
+    def agreement(self, times: NDArray[np.float64], rates: NDArray[np.float64]) -> float | None:
+        """Correlation of the scans' turns with the gyro's; None where it cannot be told.
+
+        Near 1 the scan plane turns in itself, near -1 a gyro axis is mirrored; a plane that
+        sweeps space correlates with nothing.
 
         Parameters
         ----------
@@ -73,7 +76,7 @@ class ScanTurns:
         """
         stamps = np.array(sorted(self._profiles))
         if len(stamps) < 2 or len(times) < 2:
-            return False
+            return None
         steps = (rates[1:] + rates[:-1]) / 2 * np.diff(times)
         turned = np.interp(stamps, times, np.concatenate([[0.0], np.cumsum(steps)]))
         by_gyro = np.diff(turned)
@@ -82,10 +85,10 @@ class ScanTurns:
         tells = (np.abs(by_gyro) > MIN_TURN) & np.isfinite(by_scans)
         tells &= np.abs(by_gyro) < np.radians(MAX_SHIFT)
         if tells.sum() < MIN_TURNS:
-            return False
+            return None
         a, b = by_gyro[tells], by_scans[tells]
         norm = float(np.sqrt((a @ a) * (b @ b)))
-        return norm > 0 and float(a @ b) / norm < -MIN_CORRELATION
+        return float(a @ b) / norm if norm > 0 else None
 
     def _turns(self, stamps: NDArray[np.float64]) -> NDArray[np.float64]:
         profiles = [self._profiles[float(stamp)] for stamp in stamps]

@@ -10,7 +10,6 @@ import numpy as np
 from bentwing.report.page import write_report
 from bentwing.report.picture import render_top, write_png
 from bentwing.report.views import overhead_points
-from bentwing.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from bentwing.run import Run
@@ -19,18 +18,14 @@ if TYPE_CHECKING:
 
 def report_run(folder: RunFolder, run: Run, *, complete: bool) -> None:
     """Write report.html and, where there is a map, map_top.png."""
-    trajectory = _NO_TRAJECTORY if run.estimate is None else run.estimate.trajectory
     points, times = run.sample.points, run.sample.times
     write_report(
         folder.file("report.html"),
         run_json={**folder.record, "complete": complete},
-        trajectory=trajectory,
+        trajectory=run.trajectory,
         map_sample=(points, times),
         spin=(np.array(run.spin_times), np.array(run.spin_rates)) if run.spin_times else None,
     )
     if len(points):
-        overhead = overhead_points(points, times, trajectory)
+        overhead = overhead_points(points, times, run.trajectory)
         write_png(folder.file("map_top.png"), render_top(points[~overhead]))
-
-
-_NO_TRAJECTORY = Trajectory(np.empty(0), np.empty((0, 3)), np.empty((0, 4)))

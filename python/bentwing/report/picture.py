@@ -24,6 +24,7 @@ PAPER = 255  # brightness where there is no point
 _ENCLOSED = 3  # filled neighbours of eight
 _RADII = (1, 3)  # pixels over which depth is compared
 _OUTLIERS = 0.1  # percent of the points on each side that may fall off the picture
+_SLACK = 0.25  # of the extent without outliers that they may add on each side
 _NEIGHBOURS = ((0, 1), (1, 0), (0, -1), (-1, 0), (1, 1), (1, -1), (-1, 1), (-1, -1))
 
 
@@ -140,13 +141,20 @@ def _png_chunk(kind: bytes, data: bytes) -> bytes:
 def _frame(
     across: NDArray[np.float64], up: NDArray[np.float64]
 ) -> tuple[float, float, float, float]:
-    """Left, right, bottom and top that hold all but the outliers, with a margin of 2 %."""
+    """Left, right, bottom and top that hold all but far outliers, with a margin of 2 %."""
     if not len(across):
         return -1.0, 1.0, -1.0, 1.0
-    left, right = np.percentile(across, [_OUTLIERS, 100 - _OUTLIERS])
-    bottom, top = np.percentile(up, [_OUTLIERS, 100 - _OUTLIERS])
+    left, right = _extent(across)
+    bottom, top = _extent(up)
     margin = 0.02 * max(right - left, top - bottom, 1.0)
     return left - margin, right + margin, bottom - margin, top + margin
+
+
+def _extent(values: NDArray[np.float64]) -> tuple[float, float]:
+    low, high = np.percentile(values, [_OUTLIERS, 100 - _OUTLIERS])
+    # a far wall has few points, but is not far outside of the rest
+    slack = _SLACK * (high - low)
+    return float(max(low - slack, values.min())), float(min(high + slack, values.max()))
 
 
 def _front_points(

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import yaml
 
+from bentwing.clock import format_ns
 from bentwing.simulate.imu import ImuErrors
 from bentwing.simulate.kinematics import quats_xyzw
 from bentwing.simulate.ros import to_ns
@@ -36,9 +37,8 @@ def write_poses(file: TextIO, rig: Rig, times: Array) -> None:
     """TUM lines `t x y z qx qy qz qw`: the IMU in the simulated world, at its own stamps."""
     motion = rig.imu(times)
     for time, p, q in zip(times, motion.p, quats_xyzw(motion.R), strict=True):
-        sec, nanosec = divmod(to_ns(float(time)), 1_000_000_000)
         pose = " ".join(f"{value:.9f}" for value in (*p, *q))
-        file.write(f"{sec}.{nanosec:09d} {pose}\n")
+        file.write(f"{format_ns(to_ns(float(time)))} {pose}\n")
 
 
 def write_ply(path: Path, mesh: Mesh) -> None:

@@ -21,7 +21,7 @@ pub use health::Health;
 pub use normal_equations::NormalEquations;
 pub use settings::{ImuNoise, Settings};
 pub use solve::{Solution, SolveError, Solver};
-pub use window::{Initial, Problem, Registration, register_window};
+pub use window::{Initial, Problem, Registration, first_equations, register_window};
 
 /// A vector of all global states or their corrections.
 pub type GlobalVector = [f64; N_GLOBALS];

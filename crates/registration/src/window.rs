@@ -119,6 +119,22 @@ pub fn register_window(
     Ok(state.finish(last, n_outer, step_size.converged(settings)))
 }
 
+/// The normal equations of the first iteration, for those who study how to solve them.
+pub fn first_equations(problem: &Problem<'_>, settings: &Settings) -> NormalEquations {
+    let mut state = State::new(problem, settings);
+    let (trajectory, globals) = (&state.trajectory, &state.globals);
+    let placed = Placed::new(problem.sets, trajectory, globals, &state.spline);
+    let pairs = matches::find(&placed, problem.views, settings);
+    let mut equations = state.fixed_rows(problem, settings);
+    let head = &state.globals.head;
+    Linearization::new(&placed, problem.views, &pairs, head, settings).add(
+        &mut equations,
+        &state.no_step(),
+        settings.first_cauchy_scale,
+    );
+    equations
+}
+
 /// Largest correction of a sample in one step, rad and m.
 #[derive(Clone, Copy, Debug)]
 struct StepSize {

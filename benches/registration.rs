@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Registration of a window, its parts, and the crossover of dense and sparse solution.
+#![allow(missing_docs, reason = "criterion's macros make public items")]
+
+use bentwing_benches::{Flight, Scanner, one_thread};
+use bentwing_registration::{
+    FixedView, GlobalMatrix, GlobalPrior, Initial, N_GLOBALS, NormalEquations, Problem, Settings,
+    Solver, first_equations, register_window,
+};
+use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
+
+const WINDOW: f64 = 5.0; // s
+
+/// A head without motor: the last five states do not exist.
+fn prior() -> GlobalPrior {
+    GlobalPrior {
+        information: GlobalMatrix::from_diagonal_element(1e5),
+        frozen: std::array::from_fn(|g| g >= N_GLOBALS - 5),
+    }
+}
+
+/// Runs `work` on the problem of a whole flight.
+fn with_problem<T>(
+    flight: &Flight,
+    views: &[&FixedView],
+    work: impl Fn(Problem<'_>, &Settings) -> T,
+) -> T {
+    let (sets, prior) = (flight.surfels(), prior());
+    let problem = Problem {
+        trajectory: flight.trajectory.clone(),
+        sets: &sets,
+        views,
+        imu: Some(&flight.imu),
+        globals: flight.globals.clone(),
+        prior: &prior,
+        initial: Initial::Clamped,
+    };
+    work(problem, &flight.settings())
+}
+
+fn equations(flight: &Flight) -> NormalEquations {
+    with_problem(flight, &[], |problem, settings| {
+        first_equations(&problem, settings)
+    })
+}
+
+/// One outer iteration with one solution and with three, whose difference is what two accumulations
+/// of the normal equations with their solutions cost; and everything until it converges.
+fn window(c: &mut Criterion) {
+    let pool = one_thread();
+    let mut group = c.benchmark_group("registration");
+    group.sample_size(10);
+    for (name, scanner) in [("hokuyo_5s", Scanner::Hokuyo), ("vlp16_5s", Scanner::Vlp16)] {
+        let flight = scanner.fly(WINDOW);
+        let sets = flight.surfels();
+        let first: Vec<_> = sets[..2].iter().map(AsRef::as_ref).collect();
+        let view = FixedView::freeze(&first, 0.0, 1.5, &flight.trajectory, &flight.globals);
+        for (part, max_outer, n_inner) in [("1x1", 1, 1), ("1x3", 1, 3), ("whole", 5, 2)] {
+            let settings = Settings {
+                max_outer,
+                n_inner,
+                ..flight.settings()
+            };
+            let prior = prior();
+            group.bench_function(format!("{name}/{part}"), |b| {
+                b.iter(|| {
+                    let problem = Problem {
+                        trajectory: flight.trajectory.clone(),
+                        sets: &sets,
+                        views: &[&view],
+                        imu: Some(&flight.imu),
+                        globals: flight.globals.clone(),
+                        prior: &prior,
+                        initial: Initial::Clamped,
+                    };
+                    pool.install(|| register_window(problem, &settings)).is_ok()
+                });
+            });
+        }
+    }
+    group.finish();
+}
+
+/// Factorization and solution by the number of unknowns; above the crossover sparse wins.
+fn solution(c: &mut Criterion) {
+    let mut group = c.benchmark_group("solve");
+    group.sample_size(10);
+    let frozen = prior().frozen;
+    for seconds in [5.0, 10.0, 20.0, 40.0] {
+        let equations = equations(&Scanner::Hokuyo.fly(seconds));
+        let n_unknowns = 6 * (equations.n_controls() - 3) + N_GLOBALS - 5;
+        for (name, limit) in [("dense", usize::MAX), ("sparse", 0)] {
+            let mut solver = Solver::default();
+            solver.dense_limit = Some(limit);
+            group.bench_function(BenchmarkId::new(name, n_unknowns), |b| {
+                b.iter(|| {
+                    solver
+                        .factorize(&equations, 3, &frozen)
+                        .map(|f| f.solve())
+                        .is_ok()
+                });
+            });
+        }
+    }
+    group.finish();
+}
+
+criterion_group!(benches, window, solution);
+criterion_main!(benches);

@@ -168,9 +168,9 @@ def _extrinsic_errors(found: dict, true: dict) -> dict[str, float | None]:
         return {"extrinsic_rotation": None, "extrinsic_translation": None}
     mount = true["T_imu_lidar"]
     turn = geometry.multiply(
-        np.array(found["T_imu_lidar_quat_xyzw"]), geometry.inverse(np.array(mount["quaternion"]))
+        np.array(found["mount"]["T_imu_lidar"]["quat_xyzw"]), geometry.inverse(np.array(mount["quaternion"]))
     )
-    shift = np.subtract(found["T_imu_lidar_translation"], mount["translation"])
+    shift = np.subtract(found["mount"]["T_imu_lidar"]["translation"], mount["translation"])
     return {
         "extrinsic_rotation": float(np.linalg.norm(geometry.log(turn))),
         "extrinsic_translation": float(np.linalg.norm(shift)),

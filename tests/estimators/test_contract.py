@@ -22,8 +22,8 @@ def all_bytes(estimate):
         trajectory.positions.tobytes(),
         trajectory.quats_xyzw.tobytes(),
         calibration.latency,
-        calibration.T_imu_lidar_translation.tobytes(),
-        calibration.T_imu_lidar_quat_xyzw.tobytes(),
+        calibration.mount.T_imu_lidar.translation.tobytes(),
+        calibration.mount.T_imu_lidar.quat_xyzw.tobytes(),
         calibration.gyro_bias.tobytes(),
         calibration.accel_bias.tobytes(),
         json.dumps(calibration.std),
@@ -196,4 +196,4 @@ def test_without_an_imu_in_the_payload_the_lidar_stands_for_it(head, name):
     estimate = engine.result()
     assert np.isfinite(estimate.trajectory.positions).all()
     assert estimate.calibration.latency == 0.0
-    assert estimate.calibration.T_imu_lidar_translation.tolist() == [0.0, 0.0, 0.0]
+    assert estimate.calibration.mount.T_imu_lidar.translation.tolist() == [0.0, 0.0, 0.0]

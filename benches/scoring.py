@@ -155,7 +155,8 @@ def best_points(
         in_imu = moved_by(true["encoder"]["T_imu_motor"], geometry.rotate(turns, in_motor))
     else:
         in_imu = moved_by(true["T_imu_lidar"], points[chosen])
-    return truth.transform_points(in_imu, times[chosen])
+    positions, quats = truth.interpolate(times[chosen])
+    return geometry.compose(positions, quats, in_imu)
 
 
 def moved_by(T: dict[str, list[float]], points: np.ndarray) -> np.ndarray:

@@ -57,6 +57,11 @@ impl Imu {
         self.times.is_empty()
     }
 
+    /// Time of the last sample, s; minus infinity without any.
+    pub fn end(&self) -> f64 {
+        self.times.last().copied().unwrap_or(f64::NEG_INFINITY)
+    }
+
     /// Index of the last sample at or before `t`, if `t` lies between two samples without a gap.
     fn bracket(&self, t: f64) -> Option<usize> {
         let after = self.times.partition_point(|&s| s <= t);

@@ -9,8 +9,8 @@ use crate::{Imu, Trajectory, so3};
 ///
 /// `R_{n+1} = R_n Exp(dθ_n − b_g dt)` and `p_{n+1} = 2 p_n − p_{n−1} + dt² (F_n − g)`, with `gravity`
 /// pointing up. These equations also define the IMU residuals, so that a fresh prior has residual
-/// zero. Where the IMU has a gap the motion goes on at constant velocity and rate; returns the
-/// number of samples made that way.
+/// zero. Where the IMU has a gap, and beyond its end, the motion goes on at constant velocity and
+/// rate; returns the number of samples in gaps.
 pub fn extend_inertial(
     trajectory: &mut Trajectory,
     imu: &Imu,
@@ -36,7 +36,7 @@ pub fn extend_inertial(
         if let Some(node) = imu.node_force(trajectory, n) {
             let force = trajectory.rotations()[n] * (node.force - node.bias_gain * accel_bias);
             trajectory.set_last_position(constant_velocity + (force - gravity) * (dt * dt));
-        } else {
+        } else if t_next < imu.end() {
             n_blind += 1;
         }
     }

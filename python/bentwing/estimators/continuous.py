@@ -27,13 +27,16 @@ if TYPE_CHECKING:
 
 # A rest shorter than this is waited out before the start is judged, s.
 LOOK_AHEAD = 6.0
+# A start in motion is rehearsed over these stretches first, s: velocity, then attitude.
+MOVING_REHEARSALS = (2.0, 5.0)
 
 
 class Continuous:
     """Continuous-time surfel odometry; feed batches in time order, then ask for the result.
 
-    The first seconds are run twice: once to learn the calibration, then again with it, since
-    latency, extrinsics and accelerometer bias cannot be known before the payload has turned.
+    The first seconds are rehearsed: run once to learn the calibration, then again with it, since
+    latency, extrinsics and accelerometer bias cannot be known before the payload has turned. A
+    start in motion is rehearsed over longer and longer stretches, to learn velocity and attitude.
     """
 
     def __init__(
@@ -52,7 +55,7 @@ class Continuous:
         self._start: Start | None = None
         self._first = 0.0
         self._pass: OdometryPass | None = None
-        self._rehearsing = self.settings.rehearsal > 0
+        self._rehearsals: tuple[float, ...] = ()
 
     def feed(self, batch: Batch) -> None:
         """Take the next batch; windows that have become complete are registered."""
@@ -120,30 +123,22 @@ class Continuous:
             if still_resting and not finishing:
                 return False
             self._start = start
+            if self.settings.rehearsal > 0:
+                short = () if start.static is not None else MOVING_REHEARSALS
+                self._rehearsals = (*short, self.settings.rehearsal)
         self._pass = self._new_pass(self._start, None)
         return True
 
     def _new_pass(self, start: Start, learned: OdometryPass | None) -> OdometryPass:
-        n = max(2, int((start.hold - self._first) / DT) + 1)
-        slow = self._initial_globals(start) if learned is None else self._learned_globals(learned)
-        quat = start.quat_xyzw
-        if learned is not None and start.static is not None:
-            quat = attitude_of(start.static.accel_mean - slow.accel_bias)
-        samples = _core.Samples(self._first, DT, np.zeros((n, 3)), np.repeat(quat[None], n, axis=0))
-        has_imu = self._buffer.has_imu and self._payload.imu is not None
-        if learned is None:
-            prior = SlowStatePrior(
-                self._payload.imu if has_imu else None,
-                has_motor=self._payload.encoder is not None,
-                moving=start.static is None,
-                frozen=self.settings.frozen,
-            )
-            if start.static is not None:
-                prior.tighten("gyro_bias", start.static.gyro_bias_std)
-        else:
+        # What a short rehearsal says of the biases is not worth keeping.
+        keep = learned is not None and not self._rehearsals
+        slow = learned.globals.levelled() if learned and keep else self._initial_globals(start)
+        if learned is not None and keep and start.static is not None:
             prior = learned.prior
+        else:
+            prior = self._initial_prior(start)
         begun = OdometryPass(
-            samples,
+            self._first_samples(start, learned, slow),
             slow,
             prior,
             self._sliding,
@@ -166,28 +161,51 @@ class Continuous:
             )
         )
 
-    def _learned_globals(self, learned: OdometryPass) -> _core.Globals:
-        """Keep what was learned; the map is levelled anew."""
-        return learned.globals.levelled()
+    def _initial_prior(self, start: Start) -> SlowStatePrior:
+        has_imu = self._buffer.has_imu and self._payload.imu is not None
+        prior = SlowStatePrior(
+            self._payload.imu if has_imu else None,
+            has_motor=self._payload.encoder is not None,
+            moving=start.static is None,
+            frozen=self.settings.frozen,
+        )
+        if start.static is not None:
+            prior.tighten("gyro_bias", start.static.gyro_bias_std)
+        return prior
+
+    def _first_samples(
+        self, start: Start, learned: OdometryPass | None, slow: _core.Globals
+    ) -> _core.Samples:
+        """Return the rest at the start, or the first two poses of a start in motion."""
+        if start.static is None and learned is not None:
+            _, positions, quats = learned.trajectory()
+            level = _levelling(learned.globals.gravity)
+            positions = geometry.rotate(level, positions[:2] - positions[0])
+            quats = geometry.multiply(np.stack([level, level]), quats[:2])
+            return _core.Samples(self._first, DT, positions, quats)
+        n = max(2, int((start.hold - self._first) / DT) + 1)
+        quat = start.quat_xyzw
+        if start.static is not None:
+            quat = attitude_of(start.static.accel_mean - slow.accel_bias)
+        return _core.Samples(self._first, DT, np.zeros((n, 3)), np.repeat(quat[None], n, axis=0))
 
     def _step(self, ready: float, *, finishing: bool) -> bool:
         """Register the next window if its data is complete; returns whether it was."""
         current, start = self._pass, self._start
         if current is None or start is None:
             return False
-        rehearsed = current.end - start.hold >= self.settings.rehearsal
-        if self._rehearsing and self._sliding is not self.settings:
-            self._rehearsing = False  # there is nothing to learn
-        if self._rehearsing and (rehearsed or (finishing and ready - current.end < DT)):
-            self._rehearsing = False
-            self._pass = current = self._new_pass(start, current)
+        if self._rehearsals:
+            rehearsed = current.end - start.hold >= self._rehearsals[0]
+            if rehearsed or (finishing and ready - current.end < DT):
+                self._rehearsals = self._rehearsals[1:]
+                self._pass = current = self._new_pass(start, current)
         end = current.end + self._sliding.shift
         if end > ready:
             if not finishing or ready - current.end < DT:
                 return False
             end = ready
         current.step(self._buffer, end)
-        if not self._rehearsing:
+        if not self._rehearsals:
             self._buffer.forget(end - self._sliding.window - 1.0)
         return True
 

@@ -43,7 +43,7 @@ INITIAL_STD = {
     "motor_tilt": 9e-3,
     "motor_offset": 3e-3,
 }
-MOVING_START_STD = {"gyro_bias": 0.02, "accel_bias": 0.1, "gravity": 0.2}
+MOVING_START_STD = {"gyro_bias": 0.01, "accel_bias": 0.05, "gravity": 0.2}
 # Random walks, per √s.
 WALK = {
     "latency": 1e-5,

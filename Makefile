@@ -75,11 +75,11 @@ test-rust: setup ## the crates' tests
 
 .PHONY: test-python
 test-python: $(CORE) ## the package's fast tests
-	$(BIN)/python -m pytest -n $(WORKERS)
+	$(BIN)/python -m pytest -n $(WORKERS) --dist loadscope
 
 .PHONY: test-all
 test-all: test-rust $(CORE) ## also the slow ones
-	$(BIN)/python -m pytest -n $(WORKERS) -m "slow or not slow"
+	$(BIN)/python -m pytest -n $(WORKERS) --dist loadscope -m "slow or not slow"
 
 .PHONY: golden
 golden: $(CORE) ## regenerate tests/golden; review the difference before you commit it

@@ -44,7 +44,7 @@ $(VENV)/.docs-tools: $(VENV)/.created pyproject.toml
 	@touch $@
 
 $(CORE): $(VENV)/.tools $(CORE_SOURCES)
-	$(BIN)/maturin develop --release --extras plot
+	$(BIN)/maturin develop --release
 	@touch $@
 
 .PHONY: setup
@@ -52,12 +52,12 @@ setup: $(VENV)/.tools ## make .venv and install the developer's tools
 
 .PHONY: build
 build: setup ## compile the core (release) and install the package in place
-	$(BIN)/maturin develop --release --extras plot
+	$(BIN)/maturin develop --release
 	@touch $(CORE)
 
 .PHONY: build-dev
 build-dev: setup ## the same without optimization: compiles fast, runs slowly
-	$(BIN)/maturin develop --extras plot
+	$(BIN)/maturin develop
 	@touch $(CORE)
 
 .PHONY: wheel
@@ -75,11 +75,11 @@ test-rust: setup ## the crates' tests
 
 .PHONY: test-python
 test-python: $(CORE) ## the package's fast tests
-	$(BIN)/python -m pytest -n $(WORKERS)
+	$(BIN)/python -m pytest -n $(WORKERS) --dist loadscope
 
 .PHONY: test-all
 test-all: test-rust $(CORE) ## also the slow ones
-	$(BIN)/python -m pytest -n $(WORKERS) -m "slow or not slow"
+	$(BIN)/python -m pytest -n $(WORKERS) --dist loadscope -m "slow or not slow"
 
 .PHONY: golden
 golden: $(CORE) ## regenerate tests/golden; review the difference before you commit it
@@ -140,13 +140,13 @@ demo: ## from a fresh clone to a map: needs Python 3.10 with venv, cargo, git an
 	rm -rf demo/dist demo/recording demo/run
 	$(PYTHON) -m venv demo/.venv
 	$(DEMO_PIP) wheel --no-deps --wheel-dir demo/dist .
+	$(DEMO_PIP) install demo/dist/bentwing-*.whl
+	@# The version may be the same as that of an earlier demo's.
 	$(DEMO_PIP) install --force-reinstall --no-deps demo/dist/bentwing-*.whl
-	$(DEMO_PIP) install "$$(echo demo/dist/bentwing-*.whl)[plot]"
 	demo/.venv/bin/bentwing simulate courtyard -o demo/recording --duration 30
 	demo/.venv/bin/bentwing map demo/recording/recording.bag \
 		--payload demo/recording/payload.yaml -o demo/run
-	@printf '\n  %-8s %s\n' map "$$(ls -d demo/run/map.l* demo/run/map.p[lc]* 2>/dev/null | head -1)" \
-		picture "$$(ls demo/run/*.png 2>/dev/null | head -1)" report demo/run/report.html
+	@printf '  %-8s %s\n' map demo/run/map.laz picture demo/run/map_top.png report demo/run/report.html
 
 ##@ This file
 

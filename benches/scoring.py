@@ -169,7 +169,8 @@ def _extrinsic_errors(found: dict, true: dict) -> dict[str, float | None]:
         return {"extrinsic_rotation": None, "extrinsic_translation": None}
     mount = true["T_imu_lidar"]
     turn = geometry.multiply(
-        np.array(found["mount"]["T_imu_lidar"]["quat_xyzw"]), geometry.inverse(np.array(mount["quaternion"]))
+        np.array(found["mount"]["T_imu_lidar"]["quat_xyzw"]),
+        geometry.inverse(np.array(mount["quaternion"])),
     )
     shift = np.subtract(found["mount"]["T_imu_lidar"]["translation"], mount["translation"])
     return {

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
 from bentwing.evaluate.trajectory import absolute_error
 from bentwing.trajectory import Trajectory, read_tum

@@ -73,7 +73,8 @@ fn window(c: &mut Criterion) {
                         prior: &prior,
                         initial: Initial::Clamped,
                     };
-                    pool.install(|| register_window(&problem, &settings)).is_ok()
+                    pool.install(|| register_window(&problem, &settings))
+                        .is_ok()
                 });
             });
         }

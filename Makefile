@@ -71,15 +71,16 @@ test: test-rust test-python ## all fast tests
 
 .PHONY: test-rust
 test-rust: setup ## the crates' tests
-	cargo test --workspace
+	@# The optimized build of the dependencies is shared with the extension: compiling them twice takes minutes.
+	cargo test --release --workspace
 
 .PHONY: test-python
 test-python: $(CORE) ## the package's fast tests
-	$(BIN)/python -m pytest -n $(WORKERS) --dist loadscope
+	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile
 
 .PHONY: test-all
 test-all: test-rust $(CORE) ## also the slow ones
-	$(BIN)/python -m pytest -n $(WORKERS) --dist loadscope -m "slow or not slow"
+	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile -m "slow or not slow"
 
 .PHONY: golden
 golden: $(CORE) ## regenerate tests/golden; review the difference before you commit it

@@ -13,7 +13,8 @@ from bentwing.trajectory import read_tum
 
 # What `bentwing` does, telling when a window has been registered.
 SCRIPT = """
-import sys
+import signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a background job ignores it
 from bentwing.estimators.odometry_pass import OdometryPass
 step = OdometryPass.step
 def told(self, *arguments):

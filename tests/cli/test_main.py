@@ -165,8 +165,9 @@ def test_an_unexpected_error_asks_to_be_reported(monkeypatch, capsys, debug):
 
 def test_an_interrupt_ends_a_running_command_within_a_second(tmp_path):
     script = f"""
-import time
-from bentwing import pipeline, run_settings
+import signal, time
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a background job ignores it
+from bentwing import pipeline
 def busy(*_, **__):
     print("busy", flush=True)
     time.sleep(60)

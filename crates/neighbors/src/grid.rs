@@ -19,7 +19,8 @@ pub struct Grid {
     cell_starts: Vec<u32>,
     /// Original index of each sorted feature.
     order: Vec<u32>,
-    /// Position in cells (x, y, z), normal and time of each sorted feature.
+    cell_size: f32,
+    /// Position (x, y, z), normal and time of each sorted feature.
     columns: [Vec<f32>; 6],
     times: Vec<f32>,
 }
@@ -62,6 +63,7 @@ impl Grid {
             cell_keys,
             cell_starts,
             order,
+            cell_size,
             columns,
             times,
         }
@@ -110,19 +112,64 @@ impl Grid {
         )
     }
 
-    /// The nine runs of sorted features in the 27 cells around the cell with `key`.
-    pub(crate) fn runs_around(&self, key: u64) -> [Range<usize>; 9] {
+    /// The nine columns of three cells around the cell with `key`, the middle one first.
+    pub(crate) fn columns_around(&self, key: u64) -> [Column; 9] {
         let [x, y, z] = unpack(key);
-        std::array::from_fn(|c| {
-            let (x, y) = (x + (c / 3) as i64 - 1, y + (c % 3) as i64 - 1);
-            let from = self.cell_keys.partition_point(|&k| k < pack(x, y, z - 1));
-            let mut to = from;
-            let last = pack(x, y, z + 1);
-            while to < self.cell_keys.len() && self.cell_keys[to] <= last {
-                to += 1;
+        let side = |i: i64, step: i64| match step {
+            -1 => (1.0, i as f32 * self.cell_size),
+            0 => (0.0, 0.0),
+            _ => (-1.0, (i + 1) as f32 * self.cell_size),
+        };
+        STEPS.map(|(dx, dy)| {
+            let first = pack(x + dx, y + dy, z - 1);
+            let last = pack(x + dx, y + dy, z + 1);
+            let from = self.cell_keys.partition_point(|&k| k < first);
+            let n = self.cell_keys[from..]
+                .iter()
+                .take_while(|&&k| k <= last)
+                .count();
+            Column {
+                run: self.cell_starts[from] as usize..self.cell_starts[from + n] as usize,
+                sides: [side(x, dx), side(y, dy)],
+                slack: 1e-4 * self.cell_size,
             }
-            self.cell_starts[from] as usize..self.cell_starts[to] as usize
         })
+    }
+}
+
+/// From a cell to the columns around it: itself, across its sides, across its edges.
+const STEPS: [(i64, i64); 9] = [
+    (0, 0),
+    (-1, 0),
+    (1, 0),
+    (0, -1),
+    (0, 1),
+    (-1, -1),
+    (-1, 1),
+    (1, -1),
+    (1, 1),
+];
+
+/// Three cells above each other, beside those of a query.
+#[derive(Clone, Debug)]
+pub(crate) struct Column {
+    /// Its sorted features.
+    pub(crate) run: Range<usize>,
+    /// For x and y: away from the column (or nowhere), and where it ends there.
+    sides: [(f32, f32); 2],
+    /// What rounding may put on the wrong side.
+    slack: f32,
+}
+
+impl Column {
+    /// Square of a distance that no feature of the column falls short of, for a query in the
+    /// middle cell.
+    pub(crate) fn square_distance(&self, query: &[f32; 6]) -> f32 {
+        let squares = self.sides.iter().zip(query).map(|(&(away, end), q)| {
+            let beyond = (away * (q - end) - self.slack).max(0.0);
+            beyond * beyond
+        });
+        squares.sum()
     }
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Keeps the pairs that found each other.
 
-use crate::Neighbors;
+use crate::{NONE, Neighbors};
 
 /// Pairs `(a, b)`, `a < b`, of a set searched in itself in which each is in the list of the other,
 /// ordered by `a`, then by distance.
@@ -24,20 +24,23 @@ pub fn mutual_pairs(nearest: &Neighbors) -> impl Iterator<Item = (u32, u32)> + '
 /// Unlike a search in both directions this costs no second search, and a target is not lost to a
 /// query that prefers another target.
 pub fn claimed_pairs(nearest: &Neighbors, n_targets: usize) -> Vec<(u32, u32)> {
-    let mut claims: Vec<Vec<(f32, u32)>> = vec![Vec::new(); n_targets];
+    let k = nearest.k();
+    let mut claims = vec![(f32::INFINITY, NONE); n_targets * k];
     for query in 0..nearest.len() {
         for (target, distance) in nearest.with_distances(query) {
-            let kept = &mut claims[target as usize];
-            let at = kept.partition_point(|&c| c < (distance, query as u32));
-            kept.insert(at, (distance, query as u32));
-            kept.truncate(nearest.k());
+            let mut claim = (distance, query as u32);
+            for kept in &mut claims[target as usize * k..][..k] {
+                if claim < *kept {
+                    std::mem::swap(kept, &mut claim);
+                }
+            }
         }
     }
     let of_query = |query: u32| {
         let listed = nearest.of(query as usize).iter().copied();
         let claims = &claims;
         listed
-            .filter(move |&t| claims[t as usize].iter().any(|&(_, q)| q == query))
+            .filter(move |&t| claims[t as usize * k..][..k].iter().any(|c| c.1 == query))
             .map(move |t| (query, t))
     };
     (0u32..).take(nearest.len()).flat_map(of_query).collect()

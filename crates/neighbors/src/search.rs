@@ -117,12 +117,14 @@ impl Grid {
         let (mut originals, mut lists) = (Vec::new(), Vec::new());
         let mut best = Best::new(search);
         for cell in cells {
-            let runs = self.runs_around(queries.cell_key(cell));
+            let columns = self.columns_around(queries.cell_key(cell));
             for s in queries.cell(cell) {
                 let (feature, time) = queries.feature(s);
                 best.clear();
-                for run in &runs {
-                    self.scan(run, &feature, time, search, &mut best);
+                for column in &columns {
+                    if column.square_distance(&feature) <= best.worst {
+                        self.scan(&column.run, &feature, time, search, &mut best);
+                    }
                 }
                 originals.push(queries.original(s));
                 lists.extend_from_slice(&best.list);

@@ -25,14 +25,19 @@ pub enum Target {
     Fixed(u32, u32),
 }
 
+/// The surfel of a match, by its index among the placed ones, and what it is matched to.
+type Pair = (u32, Target);
+
 /// A match between two observations of a patch.
 #[derive(Clone, Copy, Debug)]
 pub struct Match {
-    /// The surfel, by its index among the placed ones.
-    pub surfel: u32,
-    /// What it is matched to.
-    pub target: Target,
+    pair: Pair,
+    plane: MatchPlane,
+    group: Group,
 }
+
+/// First control points of the two sides; fixed views have none.
+type Group = (usize, Option<usize>);
 
 /// The search grid of placed surfels of one level.
 pub fn grid_of(surfels: &[PlacedSurfel], voxel_size: f64) -> Grid {
@@ -50,134 +55,169 @@ pub fn grid_of(surfels: &[PlacedSurfel], voxel_size: f64) -> Grid {
 
 /// Mutual nearest neighbours on every level, within the window and with the fixed views.
 pub fn find(placed: &Placed, views: &[&FixedView], settings: &Settings) -> Vec<Match> {
+    let mut pairs = Vec::new();
+    for level in 0..placed.voxel_sizes.len() {
+        find_on_level(level, placed, views, settings, &mut pairs);
+    }
+    let plane = |&pair: &Pair| {
+        let surfel = &placed.surfels[pair.0 as usize];
+        let covariance = match pair.1 {
+            Target::Moving(j) => &placed.surfels[j as usize].covariance,
+            Target::Fixed(v, j) => &views[v as usize].covariances[j as usize],
+        };
+        let plane = MatchPlane::new(surfel, covariance, settings.range_sigma);
+        let group = group(placed, pair);
+        Match { pair, plane, group }
+    };
+    let mut matches = Vec::new();
+    let planes = pairs.par_iter().with_min_len(MIN_ROWS_PER_TASK).map(plane);
+    planes.collect_into_vec(&mut matches);
+    matches
+}
+
+fn find_on_level(
+    level: usize,
+    placed: &Placed,
+    views: &[&FixedView],
+    settings: &Settings,
+    pairs: &mut Vec<Pair>,
+) {
     let search = Search {
         k: settings.n_neighbors,
         max_distance: settings.max_match_distance as f32,
         min_time_gap: settings.min_match_gap as f32,
     };
-    let mut matches = Vec::new();
-    for (level, &size) in placed.voxel_sizes.iter().enumerate() {
-        let first = placed.level_starts[level] as u32;
-        let grid = grid_of(&placed.surfels[placed.level(level)], size);
-        let nearest = grid.nearest(&grid, &search);
-        matches.extend(mutual_pairs(&nearest).map(|(a, b)| Match {
-            surfel: first + a,
-            target: Target::Moving(first + b),
-        }));
-        for (v, view) in (0u32..).zip(views) {
-            let Some(fixed) = view.grids.get(level) else {
-                continue;
-            };
-            let nearest = fixed.nearest(&grid, &search);
-            let first_fixed = view.level_starts[level] as u32;
-            let pairs = claimed_pairs(&nearest, fixed.len());
-            matches.extend(pairs.into_iter().map(|(a, b)| Match {
-                surfel: first + a,
-                target: Target::Fixed(v, first_fixed + b),
-            }));
-        }
+    let first = placed.level_starts[level] as u32;
+    let surfels = &placed.surfels[placed.level(level)];
+    let grid = grid_of(surfels, placed.voxel_sizes[level]);
+    let nearest = grid.nearest(&grid, &search);
+    let moving = mutual_pairs(&nearest);
+    pairs.extend(moving.map(|(a, b)| (first + a, Target::Moving(first + b))));
+    for (v, view) in (0u32..).zip(views) {
+        let Some(fixed) = view.grids.get(level) else {
+            continue;
+        };
+        let nearest = fixed.nearest(&grid, &search);
+        let first_fixed = view.level_starts[level] as u32;
+        let claimed = claimed_pairs(&nearest, fixed.len()).into_iter();
+        pairs.extend(claimed.map(|(a, b)| (first + a, Target::Fixed(v, first_fixed + b))));
     }
-    matches
 }
 
-/// Rows per parallel task.
-const ROWS_PER_TASK: usize = 512;
+/// Rows below which a task is not worth starting.
+const MIN_ROWS_PER_TASK: usize = 512;
 
-/// Tasks whose sums are held at once.
-const TASKS_AT_ONCE: usize = 64;
+/// Sums of rows that are held at once; fixed, so that the order of addition does not depend on the
+/// number of threads.
+const MAX_TASKS: usize = 16;
 
-/// The matches of an outer iteration with their planes, grouped by the control points they touch.
-pub struct Linearization<'a> {
+/// The matches of an outer iteration, ordered by the control points they touch.
+pub struct MatchRows<'a> {
     placed: &'a Placed,
+    views: &'a [&'a FixedView],
     head: &'a Head,
-    /// Sorted by group.
-    rows: Vec<(Group, Match, MatchPlane)>,
+    matches: &'a [Match],
 }
 
-/// First control points of the two sides; fixed views have none.
-type Group = (usize, Option<usize>);
-
-impl<'a> Linearization<'a> {
-    /// Computes the planes of `matches`.
+impl<'a> MatchRows<'a> {
+    /// The rows of `matches`, which are sorted.
     pub fn new(
         placed: &'a Placed,
-        views: &[&FixedView],
-        matches: &[Match],
+        views: &'a [&'a FixedView],
         head: &'a Head,
-        settings: &Settings,
+        matches: &'a mut [Match],
     ) -> Self {
-        let plane = |m: Match| {
-            let surfel = &placed.surfels[m.surfel as usize];
-            let (mean, covariance, other) = match m.target {
-                Target::Moving(j) => {
-                    let other = &placed.surfels[j as usize];
-                    (&other.mean, &other.covariance, Some(other.basis.first))
-                }
-                Target::Fixed(v, j) => {
-                    let (view, j) = (views[v as usize], j as usize);
-                    (&view.means[j], &view.covariances[j], None)
-                }
-            };
-            let plane = MatchPlane::new(surfel, mean, covariance, settings.range_sigma);
-            ((surfel.basis.first, other), m, plane)
-        };
-        let chunks = matches.par_chunks(ROWS_PER_TASK);
-        let rows: Vec<Vec<_>> = chunks
-            .map(|c| c.iter().map(|&m| plane(m)).collect())
-            .collect();
-        let mut rows: Vec<_> = rows.into_iter().flatten().collect();
-        rows.sort_by_key(|&(group, m, _)| (group, m.surfel, m.target));
-        Self { placed, head, rows }
+        // A changed latency moves a few surfels to other control points.
+        for m in &mut *matches {
+            m.group = group(placed, m.pair);
+        }
+        matches.sort_unstable_by_key(|m| (m.group, m.pair));
+        Self {
+            placed,
+            views,
+            head,
+            matches,
+        }
     }
 
-    /// Adds the rows, weighted by their residuals after `step`.
-    pub fn add(&self, equations: &mut NormalEquations, step: &Solution, scale: f64) -> Health {
-        let mut tasks = Vec::new();
-        for group in self.rows.chunk_by(|a, b| a.0 == b.0) {
-            tasks.extend(group.chunks(ROWS_PER_TASK));
-        }
+    /// Adds the rows, weighted by their residuals after `step`, if there was one.
+    pub fn add(
+        &self,
+        equations: &mut NormalEquations,
+        step: Option<&Solution>,
+        scale: f64,
+    ) -> Health {
+        let n_rows = self.matches.len().div_ceil(MAX_TASKS);
+        let tasks = self.matches.par_chunks(n_rows.max(MIN_ROWS_PER_TASK));
+        let n_controls = equations.n_controls();
+        let sums: Vec<_> = tasks
+            .map(|rows| self.sum(rows, n_controls, step, scale))
+            .collect();
         let mut health = Health::default();
-        for batch in tasks.chunks(TASKS_AT_ONCE) {
-            let sums: Vec<(RowGroup, Health)> = batch
-                .par_iter()
-                .map(|rows| self.sum(rows, step, scale))
-                .collect();
-            for (group, part) in sums {
-                group.flush(equations);
-                health.merge(&part);
-            }
+        for (part, part_health) in &sums {
+            equations.merge(part);
+            health.merge(part_health);
         }
         health
     }
 
-    /// Sums rows of one group.
     fn sum(
         &self,
-        rows: &[(Group, Match, MatchPlane)],
-        step: &Solution,
+        rows: &[Match],
+        n_controls: usize,
+        step: Option<&Solution>,
         scale: f64,
-    ) -> (RowGroup, Health) {
-        let (first, other) = rows[0].0;
-        let controls = (first..first + 4).chain(other.into_iter().flat_map(|f| f..f + 4));
-        let mut group = RowGroup::new(controls.collect());
-        let mut health = Health::default();
-        for (_, m, plane) in rows {
-            let n = &plane.normal;
-            let surfel = &self.placed.surfels[m.surfel as usize];
-            group.globals_mut().fill(0.0);
-            surfel_match::write_knots(&mut group.knots_mut()[..24], surfel, n, 1.0);
-            surfel_match::add_globals(group.globals_mut(), self.head, surfel, n, 1.0);
-            if let Target::Moving(j) = m.target {
-                let other = &self.placed.surfels[j as usize];
-                surfel_match::write_knots(&mut group.knots_mut()[24..], other, n, -1.0);
-                surfel_match::add_globals(group.globals_mut(), self.head, other, n, -1.0);
+    ) -> (NormalEquations, Health) {
+        let mut equations = NormalEquations::new(n_controls);
+        let (mut sum, mut health) = (RowGroup::new([]), Health::default());
+        for rows in rows.chunk_by(|a, b| a.group == b.group) {
+            let (first, other) = rows[0].group;
+            sum.reset((first..first + 4).chain(other.into_iter().flat_map(|f| f..f + 4)));
+            for row in rows {
+                self.add_row(row, &mut sum, &mut health, step, scale);
             }
-            let after = plane.residual + group.predict(&step.knots, &step.globals);
-            let x = after * plane.information.sqrt();
-            let w = cauchy_weight(x, scale);
-            group.add(plane.residual, w * plane.information);
-            health.add(other.is_none(), x, w, n, &surfel.lever);
+            sum.flush(&mut equations);
         }
-        (group.summed(), health)
+        (equations, health)
+    }
+
+    fn add_row(
+        &self,
+        row: &Match,
+        sum: &mut RowGroup,
+        health: &mut Health,
+        step: Option<&Solution>,
+        scale: f64,
+    ) {
+        let (i, target) = row.pair;
+        let surfel = &self.placed.surfels[i as usize];
+        let n = &row.plane.normal(surfel);
+        sum.globals_mut().fill(0.0);
+        surfel_match::write_knots(&mut sum.knots_mut()[..24], surfel, n, 1.0);
+        surfel_match::add_globals(sum.globals_mut(), self.head, surfel, n, 1.0);
+        let mean = match target {
+            Target::Moving(j) => {
+                let other = &self.placed.surfels[j as usize];
+                surfel_match::write_knots(&mut sum.knots_mut()[24..], other, n, -1.0);
+                surfel_match::add_globals(sum.globals_mut(), self.head, other, n, -1.0);
+                &other.mean
+            }
+            Target::Fixed(v, j) => &self.views[v as usize].means[j as usize],
+        };
+        let residual = n.dot(&(surfel.mean - mean));
+        let change = step.map_or(0.0, |s| sum.predict(&s.knots, &s.globals));
+        let x = (residual + change) * row.plane.information.sqrt();
+        let w = cauchy_weight(x, scale);
+        sum.add(residual, w * row.plane.information);
+        let is_fixed = matches!(target, Target::Fixed(..));
+        health.add(is_fixed, x, w, n, &surfel.lever);
+    }
+}
+
+fn group(placed: &Placed, pair: Pair) -> Group {
+    let first = |surfel: u32| placed.surfels[surfel as usize].basis.first;
+    match pair {
+        (i, Target::Moving(j)) => (first(i), Some(first(j))),
+        (i, Target::Fixed(..)) => (first(i), None),
     }
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The normal equations in blocks: 6×6 between control points, an arrow for the global states.
 
-use std::collections::BTreeMap;
+use rustc_hash::FxHashMap;
 
 use crate::{GlobalMatrix, GlobalVector, N_GLOBALS};
 
@@ -14,8 +14,12 @@ const EMPTY: Block = [[0.0; 6]; 6];
 /// different times match.
 #[derive(Clone, Debug)]
 pub struct NormalEquations {
-    /// Blocks `(row, column)` of the lower triangle.
-    pub(crate) blocks: BTreeMap<(usize, usize), Block>,
+    /// Blocks of the lower triangle, in the order in which they were first touched.
+    blocks: Vec<Block>,
+    /// Rows and columns of the blocks.
+    keys: Vec<(usize, usize)>,
+    /// Where the block of a row and column is.
+    places: FxHashMap<(usize, usize), usize>,
     /// For each control point and global state the column of six.
     arrow: Vec<[[f64; 6]; N_GLOBALS]>,
     corner: GlobalMatrix,
@@ -30,7 +34,9 @@ impl NormalEquations {
     /// Empty equations for `n_controls` control points; every diagonal block exists.
     pub fn new(n_controls: usize) -> Self {
         Self {
-            blocks: (0..n_controls).map(|k| ((k, k), EMPTY)).collect(),
+            blocks: vec![EMPTY; n_controls],
+            keys: (0..n_controls).map(|k| (k, k)).collect(),
+            places: (0..n_controls).map(|k| ((k, k), k)).collect(),
             arrow: vec![[[0.0; 6]; N_GLOBALS]; n_controls],
             corner: GlobalMatrix::zeros(),
             knot_gradient: vec![[0.0; 6]; n_controls],
@@ -54,16 +60,9 @@ impl NormalEquations {
         on_diagonal: bool,
         block: &Block,
     ) {
-        let key = (row.max(column), row.min(column));
-        let target = self.blocks.entry(key).or_insert(EMPTY);
+        let target = self.block_mut(row.max(column), row.min(column));
         if row >= column {
-            for (to, from) in target
-                .as_flattened_mut()
-                .iter_mut()
-                .zip(block.as_flattened())
-            {
-                *to += from;
-            }
+            add_all(target, block);
         }
         if row < column || (row == column && !on_diagonal) {
             for c in 0..6 {
@@ -72,6 +71,40 @@ impl NormalEquations {
                 }
             }
         }
+    }
+
+    fn block_mut(&mut self, row: usize, column: usize) -> &mut Block {
+        let place = *self.places.entry((row, column)).or_insert_with(|| {
+            self.blocks.push(EMPTY);
+            self.keys.push((row, column));
+            self.keys.len() - 1
+        });
+        &mut self.blocks[place]
+    }
+
+    /// Rows and columns of the blocks of the lower triangle, with the blocks.
+    pub(crate) fn blocks(&self) -> impl Iterator<Item = ((usize, usize), &Block)> {
+        self.keys.iter().copied().zip(&self.blocks)
+    }
+
+    /// Diagonal of the block between a control point and itself, of which every one exists.
+    #[cfg(test)]
+    pub(crate) fn diagonal(&self, control: usize) -> [f64; 6] {
+        std::array::from_fn(|i| self.blocks[control][i][i])
+    }
+
+    /// Adds equations of the same unknowns.
+    pub(crate) fn merge(&mut self, other: &Self) {
+        for ((row, column), block) in other.blocks() {
+            add_all(self.block_mut(row, column), block);
+        }
+        add_all(self.arrow.as_flattened_mut(), other.arrow.as_flattened());
+        self.corner += other.corner;
+        add_all(&mut self.knot_gradient, &other.knot_gradient);
+        for (to, from) in self.global_gradient.iter_mut().zip(other.global_gradient) {
+            *to += from;
+        }
+        self.cost += other.cost;
     }
 
     pub(crate) fn arrow_mut(&mut self, control: usize) -> &mut [[f64; 6]; N_GLOBALS] {
@@ -102,5 +135,12 @@ impl NormalEquations {
 
     pub(crate) fn knot_gradient(&self, control: usize) -> &[f64; 6] {
         &self.knot_gradient[control]
+    }
+}
+
+fn add_all(targets: &mut [[f64; 6]], terms: &[[f64; 6]]) {
+    let targets = targets.as_flattened_mut().iter_mut();
+    for (to, from) in targets.zip(terms.as_flattened()) {
+        *to += from;
     }
 }

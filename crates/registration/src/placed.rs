@@ -10,8 +10,8 @@ use rayon::prelude::*;
 
 use crate::Globals;
 
-/// Surfels per parallel task.
-const CHUNK: usize = 512;
+/// Least surfels per parallel task.
+const SURFELS_PER_TASK: usize = 256;
 
 /// A surfel in the map, with what its derivatives need.
 #[derive(Clone, Copy, Debug)]
@@ -71,12 +71,11 @@ impl Placed {
             placed.basis = spline.basis(placed.time);
             placed
         };
-        let chunks = sources.par_chunks(CHUNK);
-        let placed: Vec<Vec<PlacedSurfel>> = chunks
-            .map(|chunk| chunk.iter().map(place).collect())
-            .collect();
+        let mut surfels = Vec::new();
+        let tasks = sources.par_iter().with_min_len(SURFELS_PER_TASK);
+        tasks.map(place).collect_into_vec(&mut surfels);
         Self {
-            surfels: placed.into_iter().flatten().collect(),
+            surfels,
             level_starts,
             voxel_sizes,
         }

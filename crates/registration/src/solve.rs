@@ -165,7 +165,8 @@ impl Solver {
         });
         let matrix = SparseColMat::try_new_from_triplets(n, n, &triplets)
             .map_err(|e| failed(&format!("{e:?}")))?;
-        let keys: Structure = equations.blocks.keys().copied().collect();
+        let mut keys: Structure = equations.blocks().map(|(key, _)| key).collect();
+        keys.sort_unstable();
         let reusable = self
             .symbolic
             .take()
@@ -242,7 +243,7 @@ fn for_each_entry(
     layout: &Layout,
     mut visit: impl FnMut(usize, usize, f64),
 ) {
-    for (&(row, column), block) in &equations.blocks {
+    for ((row, column), block) in equations.blocks() {
         let (Some(r0), Some(c0)) = (layout.knot(row), layout.knot(column)) else {
             continue;
         };
@@ -312,7 +313,7 @@ mod tests {
             x - 0.5
         };
         for k in 0..n - 1 {
-            let mut group = RowGroup::new(vec![k, k + 1, (7 * k) % n]);
+            let mut group = RowGroup::new([k, k + 1, (7 * k) % n]);
             for _ in 0..40 {
                 group.knots_mut().iter_mut().for_each(|v| *v = next());
                 group.globals_mut().iter_mut().for_each(|v| *v = next());
@@ -352,7 +353,7 @@ mod tests {
     #[test]
     fn an_unknown_without_information_is_named() {
         let mut equations = NormalEquations::new(1);
-        let mut group = RowGroup::new(vec![0]);
+        let mut group = RowGroup::new([0]);
         for i in 0..6 {
             group.knots_mut().fill(0.0);
             group.knots_mut()[i] = 1.0;

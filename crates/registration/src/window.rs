@@ -8,7 +8,7 @@ use bentwing_trajectory::{CorrectionSpline, Imu, Trajectory};
 use nalgebra::Vector3;
 
 use crate::constraints::{imu, initial, motion, prior, velocity};
-use crate::matches::{self, Linearization};
+use crate::matches::{self, MatchRows};
 use crate::placed::Placed;
 use crate::solve::{Factorized, Solution, SolveError, Solver};
 use crate::{
@@ -76,7 +76,7 @@ pub fn register_window(
     let mut state = State::new(problem, settings);
     let mut solver = Solver::default();
     let (mut step_size, mut n_outer) = (StepSize::UNKNOWN, 0);
-    let (mut pairs, mut last) = (Vec::new(), None);
+    let (mut matches, mut last) = (Vec::new(), None);
     while n_outer < settings.max_outer && !step_size.converged(settings) {
         let placed = Placed::new(
             problem.sets,
@@ -85,35 +85,32 @@ pub fn register_window(
             &state.spline,
         );
         if step_size.moves_matches() {
-            pairs = matches::find(&placed, problem.views, settings);
+            matches = matches::find(&placed, problem.views, settings);
         }
         let fixed_rows = state.fixed_rows(problem, settings);
-        let linearization = Linearization::new(
-            &placed,
-            problem.views,
-            &pairs,
-            &state.globals.head,
-            settings,
-        );
+        let head = &state.globals.head;
+        let rows = MatchRows::new(&placed, problem.views, head, &mut matches);
         let scale = if n_outer == 0 {
             settings.first_cauchy_scale
         } else {
             settings.cauchy_scale
         };
-        let mut step = state.no_step();
+        let mut step = None;
         for _ in 0..settings.n_inner {
             let mut equations = fixed_rows.clone();
-            let health = linearization.add(&mut equations, &step, scale);
+            let health = rows.add(&mut equations, step.as_ref(), scale);
             let n_clamped = if problem.initial == Initial::Clamped {
                 3
             } else {
                 0
             };
             let factorized = solver.factorize(&equations, n_clamped, &problem.prior.frozen)?;
-            step = factorized.solve();
+            step = Some(factorized.solve());
             last = Some((factorized, health, placed.surfels.len()));
         }
-        step_size = state.apply(&step)?;
+        if let Some(step) = step {
+            step_size = state.apply(&step)?;
+        }
         n_outer += 1;
     }
     Ok(state.finish(last, n_outer, step_size.converged(settings)))
@@ -124,14 +121,10 @@ pub fn first_equations(problem: &Problem<'_>, settings: &Settings) -> NormalEqua
     let mut state = State::new(problem, settings);
     let (trajectory, globals) = (&state.trajectory, &state.globals);
     let placed = Placed::new(problem.sets, trajectory, globals, &state.spline);
-    let pairs = matches::find(&placed, problem.views, settings);
+    let mut matches = matches::find(&placed, problem.views, settings);
     let mut equations = state.fixed_rows(problem, settings);
-    let head = &state.globals.head;
-    Linearization::new(&placed, problem.views, &pairs, head, settings).add(
-        &mut equations,
-        &state.no_step(),
-        settings.first_cauchy_scale,
-    );
+    let rows = MatchRows::new(&placed, problem.views, &state.globals.head, &mut matches);
+    rows.add(&mut equations, None, settings.first_cauchy_scale);
     equations
 }
 
@@ -178,13 +171,6 @@ impl State {
             globals: problem.globals.clone(),
             moved: [0.0; N_GLOBALS],
             n_blind: 0,
-        }
-    }
-
-    fn no_step(&self) -> Solution {
-        Solution {
-            knots: vec![[0.0; 6]; self.spline.n_controls()],
-            globals: [0.0; N_GLOBALS],
         }
     }
 

@@ -3,6 +3,7 @@
 
 use bentwing_trajectory::{Head, Trajectory};
 use nalgebra::Vector3;
+use rustc_hash::FxHashMap;
 
 use crate::{Moments, SurfelSet, place_points, sym3};
 
@@ -74,14 +75,18 @@ pub fn extract(
         ..SurfelSet::default()
     };
     let mut ranks = Vec::new();
-    let mut cells = runs(&placed, &points, &origin, settings);
+    let mut cells = merge(
+        of_points(&placed, points, origin, settings.voxel_size),
+        settings,
+    );
     for level in 0..settings.n_levels {
         if level > 0 {
-            for cell in &mut cells {
-                cell.key = coarser(cell.key);
-            }
+            let coarser = cells.into_iter().map(|c| Cell {
+                key: coarser(c.key),
+                ..c
+            });
+            cells = merge(coarser, settings);
         }
-        cells = merge(&cells, settings);
         let size = settings.voxel_size * f64::from(1u32 << level);
         for cell in &cells {
             if push_surfel(
@@ -146,46 +151,44 @@ fn rank(key: u64, level: usize) -> u64 {
     x ^ (x >> 31)
 }
 
-/// Consecutive points in the same voxel, which a scan line has many of, become one cell at once.
-fn runs(
+/// The placed points as cells of one point each.
+fn of_points(
     placed: &[[f64; 3]],
-    points: &Points<'_>,
-    origin: &Vector3<f64>,
-    settings: &Settings,
-) -> Vec<Cell> {
-    let mut cells: Vec<Cell> = Vec::with_capacity(placed.len() / 4);
-    for (i, p) in placed.iter().enumerate() {
-        let key = pack(p, settings.voxel_size);
+    points: Points<'_>,
+    origin: Vector3<f64>,
+    voxel_size: f64,
+) -> impl Iterator<Item = Cell> {
+    placed.iter().enumerate().map(move |(i, p)| {
         let angle = points.angles.get(i).copied().unwrap_or(0.0);
         let local = [p[0] - origin.x, p[1] - origin.y, p[2] - origin.z];
-        let moments = Moments::of_point(local, points.stamps[i], angle);
-        match cells.last_mut() {
-            Some(last) if last.key == key && belongs(&last.moments, &moments, settings) => {
-                last.moments.merge(&moments);
-            }
-            _ => cells.push(Cell { key, moments }),
+        Cell {
+            key: pack(p, voxel_size),
+            moments: Moments::of_point(local, points.stamps[i], angle),
         }
-    }
-    cells
+    })
 }
 
 /// Merges cells of the same voxel as long as neither a pause nor the span of time forbids it.
-fn merge(cells: &[Cell], settings: &Settings) -> Vec<Cell> {
-    let mut order: Vec<(u64, u32)> = (0u32..).zip(cells).map(|(i, c)| (c.key, i)).collect();
-    order.sort_unstable_by(|a, b| {
-        let time = |i: u32| cells[i as usize].moments.span().0;
-        a.0.cmp(&b.0)
-            .then_with(|| time(a.1).total_cmp(&time(b.1)))
-            .then(a.1.cmp(&b.1))
-    });
-    let mut merged: Vec<Cell> = Vec::with_capacity(cells.len() / 2);
-    for (key, i) in order {
-        let moments = cells[i as usize].moments;
-        match merged.last_mut() {
-            Some(last) if last.key == key && belongs(&last.moments, &moments, settings) => {
-                last.moments.merge(&moments);
+///
+/// Takes them in order of their first times and returns them so.
+fn merge(cells: impl IntoIterator<Item = Cell>, settings: &Settings) -> Vec<Cell> {
+    let mut open = FxHashMap::default();
+    let mut merged: Vec<Cell> = Vec::new();
+    let mut latest = 0;
+    for cell in cells {
+        // A scan line stays in a voxel for many points.
+        if merged.get(latest).is_none_or(|m| m.key != cell.key) {
+            latest = *open.entry(cell.key).or_insert(merged.len());
+        }
+        match merged.get_mut(latest) {
+            Some(m) if belongs(&m.moments, &cell.moments, settings) => {
+                m.moments.merge(&cell.moments);
             }
-            _ => merged.push(Cell { key, moments }),
+            _ => {
+                latest = merged.len();
+                open.insert(cell.key, latest);
+                merged.push(cell);
+            }
         }
     }
     merged

@@ -13,7 +13,7 @@ const SIGMA: [f64; 2] = [1e-5, 1e-4];
 /// Adds `δ(t) = 0` at the start `t` of the trajectory; its velocity stays free.
 pub fn add(equations: &mut NormalEquations, spline: &CorrectionSpline, t: f64) {
     let basis = spline.basis(t);
-    let mut group = RowGroup::new((basis.first..basis.first + 4).collect());
+    let mut group = RowGroup::new(basis.first..basis.first + 4);
     for part in 0..6 {
         group.clear_row();
         let knots = group.knots_mut();

@@ -17,32 +17,33 @@ use crate::rows::RowGroup;
 /// Rows of neighbouring samples of the trajectory, which mostly share their five control points.
 pub(crate) struct StencilRows<'a> {
     equations: &'a mut NormalEquations,
-    group: Option<(usize, RowGroup)>,
+    first: usize,
+    group: RowGroup,
 }
 
 impl<'a> StencilRows<'a> {
     pub fn new(equations: &'a mut NormalEquations) -> Self {
         Self {
             equations,
-            group: None,
+            first: usize::MAX,
+            group: RowGroup::new([]),
         }
     }
 
     /// The group of the control points `first .. first + 5`.
     pub fn group(&mut self, first: usize) -> &mut RowGroup {
-        if self.group.as_ref().is_none_or(|(f, _)| *f != first) {
+        if self.first != first {
             self.flush();
+            self.first = first;
+            self.group.reset(first..first + 5);
         }
-        &mut self
-            .group
-            .get_or_insert_with(|| (first, RowGroup::new((first..first + 5).collect())))
-            .1
+        &mut self.group
     }
 
     pub fn flush(&mut self) {
-        if let Some((_, group)) = self.group.take() {
-            group.flush(self.equations);
-        }
+        self.group.flush(self.equations);
+        self.first = usize::MAX;
+        self.group.reset([]);
     }
 }
 

@@ -11,28 +11,26 @@ use crate::placed::PlacedSurfel;
 /// The plane of a match: normal and weight from the sum of both covariances.
 #[derive(Clone, Copy, Debug)]
 pub struct MatchPlane {
-    /// Eigenvector of the smallest eigenvalue of `S_i + S_j`.
-    pub normal: Vector3<f64>,
-    /// `nᵀ (μ_i − μ_j)`, m.
-    pub residual: f64,
+    /// Eigenvector of the smallest eigenvalue of `S_i + S_j`, in the IMU frame at the time of the
+    /// surfel, with which it turns from iteration to iteration.
+    normal_imu: Vector3<f64>,
     /// `ξ² = 1 / (σ_r² + λ1)`, m⁻².
     pub information: f64,
 }
 
 impl MatchPlane {
-    /// The plane between a surfel and the mean and covariance of its counterpart, map frame.
-    pub fn new(
-        surfel: &PlacedSurfel,
-        mean: &Vector3<f64>,
-        covariance: &Matrix3<f64>,
-        range_sigma: f64,
-    ) -> Self {
+    /// The plane between a surfel and the covariance of its counterpart, map frame.
+    pub fn new(surfel: &PlacedSurfel, covariance: &Matrix3<f64>, range_sigma: f64) -> Self {
         let eigen = sym3::eigen(&(surfel.covariance + covariance));
         Self {
-            normal: eigen.normal,
-            residual: eigen.normal.dot(&(surfel.mean - mean)),
+            normal_imu: surfel.R_map_imu.tr_mul(&eigen.normal),
             information: 1.0 / (range_sigma * range_sigma + eigen.values[0].max(0.0)),
         }
+    }
+
+    /// The unit normal, map frame.
+    pub fn normal(&self, surfel: &PlacedSurfel) -> Vector3<f64> {
+        surfel.R_map_imu * self.normal_imu
     }
 }
 
@@ -98,7 +96,7 @@ mod tests {
             surfel.basis = spline.basis(surfel.time);
             let n = Vector3::new(0.48, -0.6, 0.64);
             let first = surfel.basis.first;
-            let mut group = RowGroup::new((first..first + 4).collect());
+            let mut group = RowGroup::new(first..first + 4);
             write_knots(group.knots_mut(), &surfel, &n, 1.0);
             add_globals(group.globals_mut(), &scene.globals.head, &surfel, &n, 1.0);
             assert_row(&scene, &group, |controls, globals| {

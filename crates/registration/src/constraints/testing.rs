@@ -202,7 +202,7 @@ fn gradient_of(equations: &NormalEquations) -> Vec<f64> {
 fn diagonal_of(equations: &NormalEquations) -> Vec<f64> {
     let knot = |k: usize| (0..6).map(move |i| (k, i));
     let knots = (0..equations.n_controls()).flat_map(knot);
-    let knots = knots.map(|(k, i)| equations.blocks[&(k, k)][i][i]);
+    let knots = knots.map(|(k, i)| equations.diagonal(k)[i]);
     knots
         .chain((0..N_GLOBALS).map(|g| equations.corner()[(g, g)]))
         .collect()

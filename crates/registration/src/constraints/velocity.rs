@@ -10,15 +10,15 @@ use crate::{NormalEquations, Settings};
 /// correction of the velocity.
 pub fn add(equations: &mut NormalEquations, spline: &CorrectionSpline, settings: &Settings) {
     for m in 0..spline.n_controls() - 1 {
-        let mut group = RowGroup::new(vec![m, m + 1]);
+        let mut group = RowGroup::new([m, m + 1]);
         for part in 0..6 {
             let sigma = if part < 3 {
                 settings.rate_sigma
             } else {
                 settings.velocity_sigma
             };
+            group.clear_row();
             let knots = group.knots_mut();
-            knots.fill(0.0);
             knots[part] = -1.0;
             knots[6 + part] = 1.0;
             group.add(0.0, (sigma * spline.h()).powi(-2));

@@ -15,6 +15,7 @@ const WINDOW: f64 = 5.0; // s
 fn prior() -> GlobalPrior {
     GlobalPrior {
         information: GlobalMatrix::from_diagonal_element(1e5),
+        offset: [0.0; N_GLOBALS],
         frozen: std::array::from_fn(|g| g >= N_GLOBALS - 5),
     }
 }

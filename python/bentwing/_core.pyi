@@ -309,6 +309,10 @@ class Registration:
         """Covariance (20, 20) of the slow states; zero where frozen."""
 
     @property
+    def offset(self) -> list[float]:
+        """Correction (20,) that leads from the prior's mean to `globals`."""
+
+    @property
     def n_surfels(self) -> int:
         """Surfels that took part."""
 
@@ -360,6 +364,7 @@ def register_window(
     globals: Globals,
     *,
     information: NDArray[np.float64],
+    offset: Sequence[float],
     frozen: Sequence[bool],
     clamped: bool,
     settings: CoreSettings,
@@ -369,7 +374,8 @@ def register_window(
 
     Parameters
     ----------
-    information : (20, 20) float64 about the slow states' values in `globals`
+    information : (20, 20) float64 about the prior's mean of the slow states
+    offset : (20,) correction that leads from that mean to `globals`
     frozen : (20) slow states that are not estimated
     clamped : whether the start continues a frozen past (the first three control points stay);
         otherwise only the first pose stays

@@ -128,6 +128,7 @@ def register_window(
         None if imu is None else _core.Imu(imu.times, imu.gyro, imu.accel),
         slow,
         information=known.information,
+        offset=known.offset,
         frozen=known.frozen.tolist(),
         clamped=continues,
         settings=CoreSettings.of(settings.registration, payload, _interval(prior)),

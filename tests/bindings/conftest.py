@@ -142,6 +142,7 @@ def register(flight, drifted, extract):
             "imu": _core.Imu(*flight.imu),
             "globals": make_globals(),
             "information": INFORMATION,
+            "offset": [0.0] * 20,
             "frozen": [False] * 15 + [True] * 5,
             "clamped": False,
             "settings": core,

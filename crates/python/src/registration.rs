@@ -230,6 +230,12 @@ impl Registration {
         to_array2(py, &rows)
     }
 
+    /// Correction (20,) that leads from the prior's mean to `globals`.
+    #[getter]
+    fn offset(&self) -> [f64; N_GLOBALS] {
+        self.0.offset
+    }
+
     /// Surfels that took part.
     #[getter]
     fn n_surfels(&self) -> usize {
@@ -308,7 +314,8 @@ fn eigenvalues(sum: &Matrix3<f64>, weight: f64) -> [f64; 3] {
 /// Corrects `samples` and `globals` by surfel matches and inertial samples.
 #[pyfunction]
 #[pyo3(signature = (
-    samples, surfels, views, imu, globals, *, information, frozen, clamped, settings, threads = 0,
+    samples, surfels, views, imu, globals, *, information, offset, frozen, clamped, settings,
+    threads = 0,
 ))]
 #[allow(clippy::too_many_arguments, reason = "the parts of a problem")]
 pub(crate) fn register_window(
@@ -319,6 +326,7 @@ pub(crate) fn register_window(
     imu: Option<&Imu>,
     globals: &Globals,
     information: PyReadonlyArray2<'_, f64>,
+    offset: [f64; N_GLOBALS],
     frozen: [bool; N_GLOBALS],
     clamped: bool,
     settings: RegistrationSettings,
@@ -344,6 +352,7 @@ pub(crate) fn register_window(
         globals: globals.0.clone(),
         prior: &GlobalPrior {
             information,
+            offset,
             frozen,
         },
         initial: if clamped {

@@ -1,27 +1,29 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Surfels that do not move: from earlier in the trajectory, or from a prior map.
+//! Surfels of an earlier stretch of the trajectory, which does not move any more.
 
 use bentwing_neighbors::Grid;
 use bentwing_surfels::SurfelSet;
 use bentwing_trajectory::Trajectory;
-use nalgebra::{Matrix3, Vector3};
 
-use crate::placed::place;
+use crate::placed::{PlacedSurfel, place};
 use crate::{Globals, matches::grid_of};
 
-/// A set of immovable surfels in the map (Kaul 2015, section 2.1), with its search grids.
+/// Surfels from poses that are final (Kaul 2015, section 2.1), with their search grids.
+///
+/// Their places still follow the calibration: were they held where an earlier one had put them,
+/// they would hold the calibration at that value.
 #[derive(Clone, Debug)]
 pub struct FixedView {
-    /// Means, m, map frame.
-    pub(crate) means: Vec<Vector3<f64>>,
-    /// Covariances of the points, m², map frame.
-    pub(crate) covariances: Vec<Matrix3<f64>>,
+    /// The surfels where `globals` puts them.
+    pub(crate) surfels: Vec<PlacedSurfel>,
+    /// The global states when the view was frozen.
+    pub(crate) globals: Globals,
     pub(crate) level_starts: Vec<usize>,
     pub(crate) grids: Vec<Grid>,
 }
 
 impl FixedView {
-    /// Freezes the surfels of `set` whose stamps lie in `[from, to)` where they are now.
+    /// Freezes the surfels of `set` whose stamps lie in `[from, to)`.
     pub fn freeze(
         set: &[&SurfelSet],
         from: f64,
@@ -31,8 +33,8 @@ impl FixedView {
     ) -> Self {
         let voxel_sizes = set.first().map_or(Vec::new(), |s| s.voxel_sizes.clone());
         let mut view = Self {
-            means: Vec::new(),
-            covariances: Vec::new(),
+            surfels: Vec::new(),
+            globals: globals.clone(),
             level_starts: vec![0],
             grids: Vec::new(),
         };
@@ -45,20 +47,19 @@ impl FixedView {
                 placed.extend(within.map(|i| place(s, i, trajectory, globals)));
             }
             view.grids.push(grid_of(&placed, *size));
-            view.means.extend(placed.iter().map(|p| p.mean));
-            view.covariances.extend(placed.iter().map(|p| p.covariance));
-            view.level_starts.push(view.means.len());
+            view.surfels.extend(placed);
+            view.level_starts.push(view.surfels.len());
         }
         view
     }
 
     /// Number of surfels.
     pub fn len(&self) -> usize {
-        self.means.len()
+        self.surfels.len()
     }
 
     /// Whether there are no surfels.
     pub fn is_empty(&self) -> bool {
-        self.means.is_empty()
+        self.surfels.is_empty()
     }
 }

@@ -2,7 +2,7 @@
 //! The slow states that are estimated along with the trajectory.
 
 use bentwing_trajectory::{Head, so3};
-use nalgebra::{Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use crate::{GlobalMatrix, GlobalVector};
 
@@ -70,6 +70,29 @@ impl Globals {
                 Translation3::from(lidar.translation.vector + pair(index::MOTOR_OFFSET));
         }
     }
+
+    /// The correction of latency, extrinsics and motor that leads from `earlier` to here.
+    pub fn head_moved_from(&self, earlier: &Self) -> GlobalVector {
+        let mut delta = [0.0; N_GLOBALS];
+        let (now, then) = (&self.head, &earlier.head);
+        let turn = |a: UnitQuaternion<f64>, b: UnitQuaternion<f64>| so3::log(&(a * b.inverse()));
+        let shift =
+            |a: &Isometry3<f64>, b: &Isometry3<f64>| a.translation.vector - b.translation.vector;
+        delta[index::LATENCY] = now.latency - then.latency;
+        let (a, b) = (&now.T_imu_base, &then.T_imu_base);
+        delta[index::EXTRINSIC_ROTATION].copy_from_slice(turn(a.rotation, b.rotation).as_slice());
+        delta[index::EXTRINSIC_TRANSLATION].copy_from_slice(shift(a, b).as_slice());
+        if let (Some(now), Some(then)) = (&now.motor, &then.motor) {
+            delta[index::ENCODER_ZERO] = now.zero - then.zero;
+            let (a, b) = (&now.T_motor_lidar, &then.T_motor_lidar);
+            let (tilt, offset) = (turn(a.rotation, b.rotation), shift(a, b));
+            for (k, u) in so3::orthogonal_pair(&now.axis).iter().enumerate() {
+                delta[index::MOTOR_TILT.start + k] = u.dot(&tilt);
+                delta[index::MOTOR_OFFSET.start + k] = u.dot(&offset);
+            }
+        }
+        delta
+    }
 }
 
 fn renormalized(q: UnitQuaternion<f64>) -> UnitQuaternion<f64> {
@@ -79,8 +102,31 @@ fn renormalized(q: UnitQuaternion<f64>) -> UnitQuaternion<f64> {
 /// What is known of the global states before a registration.
 #[derive(Clone, Debug)]
 pub struct GlobalPrior {
-    /// Information matrix about the values the registration starts from.
+    /// Information matrix about its mean.
     pub information: GlobalMatrix,
+    /// Correction that leads from the mean to the values the registration starts from.
+    pub offset: GlobalVector,
     /// States that are not estimated at all.
     pub frozen: [bool; N_GLOBALS],
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::constraints::testing::Scene;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn the_way_back_is_the_correction(
+            scene in Scene::any(), delta in prop::array::uniform20(-0.3..0.3_f64),
+        ) {
+            let mut corrected = scene.globals.clone();
+            corrected.correct(&delta);
+            let found = corrected.head_moved_from(&scene.globals);
+            for i in (0..N_GLOBALS).filter(|i| !(index::GYRO_BIAS.start..index::GRAVITY.end).contains(i)) {
+                prop_assert!((found[i] - delta[i]).abs() < 1e-9, "state {i}");
+            }
+        }
+    }
 }

@@ -11,7 +11,7 @@ use crate::placed::{Placed, PlacedSurfel};
 use crate::robust::cauchy_weight;
 use crate::rows::RowGroup;
 use crate::solve::Solution;
-use crate::{Health, NormalEquations, Settings};
+use crate::{GlobalVector, Globals, Health, N_GLOBALS, NormalEquations, Settings};
 
 /// Features are searched within cells of this size, in voxels.
 const CELL: f32 = 1.0;
@@ -63,7 +63,7 @@ pub fn find(placed: &Placed, views: &[&FixedView], settings: &Settings) -> Vec<M
         let surfel = &placed.surfels[pair.0 as usize];
         let covariance = match pair.1 {
             Target::Moving(j) => &placed.surfels[j as usize].covariance,
-            Target::Fixed(v, j) => &views[v as usize].covariances[j as usize],
+            Target::Fixed(v, j) => &views[v as usize].surfels[j as usize].covariance,
         };
         let plane = MatchPlane::new(surfel, covariance, settings.range_sigma);
         let group = group(placed, pair);
@@ -115,6 +115,8 @@ const MAX_TASKS: usize = 16;
 pub struct MatchRows<'a> {
     placed: &'a Placed,
     views: &'a [&'a FixedView],
+    /// How far the calibration has come since each view was frozen.
+    since_views: Vec<GlobalVector>,
     head: &'a Head,
     matches: &'a [Match],
 }
@@ -124,7 +126,7 @@ impl<'a> MatchRows<'a> {
     pub fn new(
         placed: &'a Placed,
         views: &'a [&'a FixedView],
-        head: &'a Head,
+        globals: &'a Globals,
         matches: &'a mut [Match],
     ) -> Self {
         // A changed latency moves a few surfels to other control points.
@@ -135,7 +137,11 @@ impl<'a> MatchRows<'a> {
         Self {
             placed,
             views,
-            head,
+            since_views: views
+                .iter()
+                .map(|v| globals.head_moved_from(&v.globals))
+                .collect(),
+            head: &globals.head,
             matches,
         }
     }
@@ -195,16 +201,26 @@ impl<'a> MatchRows<'a> {
         sum.globals_mut().fill(0.0);
         surfel_match::write_knots(&mut sum.knots_mut()[..24], surfel, n, 1.0);
         surfel_match::add_globals(sum.globals_mut(), self.head, surfel, n, 1.0);
-        let mean = match target {
+        let mut residual = n.dot(&surfel.mean);
+        match target {
             Target::Moving(j) => {
                 let other = &self.placed.surfels[j as usize];
                 surfel_match::write_knots(&mut sum.knots_mut()[24..], other, n, -1.0);
                 surfel_match::add_globals(sum.globals_mut(), self.head, other, n, -1.0);
-                &other.mean
+                residual -= n.dot(&other.mean);
             }
-            Target::Fixed(v, j) => &self.views[v as usize].means[j as usize],
-        };
-        let residual = n.dot(&(surfel.mean - mean));
+            Target::Fixed(v, j) => {
+                let other = &self.views[v as usize].surfels[j as usize];
+                let mut globals = [0.0; N_GLOBALS];
+                surfel_match::add_globals(&mut globals, self.head, other, n, -1.0);
+                residual -= n.dot(&other.mean);
+                let since = &self.since_views[v as usize];
+                for ((to, g), moved) in sum.globals_mut().iter_mut().zip(globals).zip(since) {
+                    *to += g;
+                    residual += g * moved;
+                }
+            }
+        }
         let change = step.map_or(0.0, |s| sum.predict(&s.knots, &s.globals));
         let x = (residual + change) * row.plane.information.sqrt();
         let w = cauchy_weight(x, scale);

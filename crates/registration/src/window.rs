@@ -32,7 +32,7 @@ pub struct Problem<'a> {
     pub trajectory: Trajectory,
     /// Surfels of the trajectory.
     pub sets: &'a [Arc<SurfelSet>],
-    /// Immovable surfels.
+    /// Surfels of final poses.
     pub views: &'a [&'a FixedView],
     /// Inertial samples, or none for a lidar alone.
     pub imu: Option<&'a Imu>,
@@ -53,6 +53,8 @@ pub struct Registration {
     pub globals: Globals,
     /// Covariance of the global states; zero where frozen.
     pub covariance: GlobalMatrix,
+    /// Correction that leads from the prior's mean to `globals`.
+    pub offset: GlobalVector,
     /// Matches of the last iteration.
     pub health: Health,
     /// Surfels that took part.
@@ -88,8 +90,7 @@ pub fn register_window(
             matches = matches::find(&placed, problem.views, settings);
         }
         let fixed_rows = state.fixed_rows(problem, settings);
-        let head = &state.globals.head;
-        let rows = MatchRows::new(&placed, problem.views, head, &mut matches);
+        let rows = MatchRows::new(&placed, problem.views, &state.globals, &mut matches);
         let scale = if n_outer == 0 {
             settings.first_cauchy_scale
         } else {
@@ -123,7 +124,7 @@ pub fn first_equations(problem: &Problem<'_>, settings: &Settings) -> NormalEqua
     let placed = Placed::new(problem.sets, trajectory, globals, &state.spline);
     let mut matches = matches::find(&placed, problem.views, settings);
     let mut equations = state.fixed_rows(problem, settings);
-    let rows = MatchRows::new(&placed, problem.views, &state.globals.head, &mut matches);
+    let rows = MatchRows::new(&placed, problem.views, &state.globals, &mut matches);
     rows.add(&mut equations, None, settings.first_cauchy_scale);
     equations
 }
@@ -169,7 +170,7 @@ impl State {
             spline: CorrectionSpline::covering(start, end, settings.knot_interval),
             trajectory,
             globals: problem.globals.clone(),
-            moved: [0.0; N_GLOBALS],
+            moved: problem.prior.offset,
             n_blind: 0,
         }
     }
@@ -234,6 +235,7 @@ impl State {
             trajectory: self.trajectory,
             globals: self.globals,
             covariance,
+            offset: self.moved,
             health,
             n_surfels,
             n_outer,

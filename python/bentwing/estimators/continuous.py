@@ -135,6 +135,7 @@ class Continuous:
         slow = learned.globals.levelled() if learned and keep else self._initial_globals(start)
         if learned is not None and keep and start.static is not None:
             prior = learned.prior
+            prior.recentre("gravity")
         else:
             prior = self._initial_prior(start)
         begun = OdometryPass(

@@ -133,6 +133,7 @@ class OdometryPass:
             imu,
             self.globals,
             information=self.prior.information,
+            offset=self.prior.offset,
             frozen=self.prior.frozen.tolist(),
             clamped=clamped,
             settings=self._core,
@@ -142,7 +143,8 @@ class OdometryPass:
         self.globals = result.globals
         self.covariance = result.covariance
         length = self._end - start
-        self.prior.carry(result.covariance, min(self._settings.shift, length), length)
+        shift = min(self._settings.shift, length)
+        self.prior.carry(result.covariance, result.offset, shift, length)
         self.windows.append(self._record(result))
 
     def _record(self, result: _core.Registration) -> dict[str, Any]:

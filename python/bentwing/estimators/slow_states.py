@@ -10,7 +10,7 @@ import numpy as np
 from bentwing.errors import UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
     from numpy.typing import NDArray
 
@@ -59,8 +59,9 @@ MATCH_INDEPENDENCE = 0.1
 class SlowStatePrior:
     """What is known of the slow states, carried from window to window.
 
-    Re-centring a prior of fixed width on the last estimate would let weakly observable directions
-    walk; carrying the information each window gains holds them.
+    Each second is seen by several windows, so a share of what a window says is carried, and the
+    mean follows by that share only: a prior re-centred on each window's estimate would let weakly
+    observable directions walk.
     """
 
     def __init__(
@@ -70,6 +71,7 @@ class SlowStatePrior:
         std = INITIAL_STD | (MOVING_START_STD if moving else {})
         self.frozen = np.zeros(N_STATES, dtype=bool)
         self._information = np.zeros((N_STATES, N_STATES))
+        self._offset = np.zeros(N_STATES)
         self._walk = np.zeros(N_STATES)
         walk = WALK if imu is None else WALK | {"gyro_bias": imu.gyro_bias_walk}
         for name, place in SLICES.items():
@@ -80,8 +82,17 @@ class SlowStatePrior:
 
     @property
     def information(self) -> NDArray[np.float64]:
-        """(20, 20) information about the current values."""
+        """(20, 20) information about the prior's mean."""
         return self._information
+
+    @property
+    def offset(self) -> list[float]:
+        """Correction (20,) that leads from the prior's mean to the current values."""
+        return self._offset.tolist()
+
+    def recentre(self, name: str) -> None:
+        """Take the current value of one state for its mean."""
+        self._offset[SLICES[name]] = 0.0
 
     def tighten(self, name: str, std: NDArray[np.float64]) -> None:
         """Replace the prior of one state by independent standard deviations."""
@@ -90,12 +101,19 @@ class SlowStatePrior:
         self._information[:, index] = 0.0
         self._information[index, index] = std**-2.0
 
-    def carry(self, covariance: NDArray[np.float64], shift: float, window: float) -> None:
+    def carry(
+        self,
+        covariance: NDArray[np.float64],
+        offset: Sequence[float],
+        shift: float,
+        window: float,
+    ) -> None:
         """Forget by the random walks over `shift` seconds, and add what a window has gained.
 
         Parameters
         ----------
         covariance : (20, 20) of the slow states after the window, prior included
+        offset : (20,) correction that leads from the prior's mean to the window's estimate
         shift, window : s
         """
         active = ~self.frozen
@@ -103,11 +121,15 @@ class SlowStatePrior:
             return
         block = np.ix_(active, active)
         before = self._information[block]
-        gained = np.linalg.inv(covariance[block]) - before
+        gained = _positive_part(np.linalg.inv(covariance[block]) - before)
         diffused = np.linalg.inv(before) + np.diag(self._walk[active] * shift)
         share = MATCH_INDEPENDENCE * shift / window
-        after = np.linalg.inv(diffused) + share * _positive_part(gained)
+        after = np.linalg.inv(diffused) + share * gained
         self._information[block] = 0.5 * (after + after.T)
+        # The window alone says x_w, with gained (x_w - mean) = (before + gained) (estimate - mean).
+        estimate = np.asarray(offset)[active]
+        pull = share * (before + gained) @ estimate
+        self._offset[active] = estimate - np.linalg.solve(after, pull)
 
 
 def named_std(covariance: NDArray[np.float64], frozen: NDArray[np.bool_]) -> dict[str, list[float]]:

@@ -54,7 +54,7 @@ def check_pcap(path: Path) -> None:
     if head[:4] == PCAPNG:
         msg = (
             f"{path}: a capture in the pcapng format, of which only the older pcap can be read; "
-            f"convert it with `editcap -F pcap {path.name} {path.stem}.pcap`"
+            f"convert it with `editcap -F pcap {path.name} {path.stem}-old.pcap`"
         )
         raise RecordingError(msg)
     if len(head) < 24 or head[:4] not in MAGICS:
@@ -123,7 +123,9 @@ def _kind(datagram: Datagram) -> str:
     payload, size = datagram.payload, len(datagram.payload)
     if size == 1206 and payload[:2] == b"\xff\xee":
         return UDP_VELODYNE
-    if datagram.port == OUSTER_LIDAR_PORT or size in OUSTER_LEGACY_SIZES:
+    # Later formats begin with their type; heads, columns and beams add up to multiples of 64.
+    is_later = payload[:2] == b"\1\0" and size > 1000 and size % 64 == 0
+    if datagram.port == OUSTER_LIDAR_PORT or size in OUSTER_LEGACY_SIZES or is_later:
         return UDP_OUSTER_LIDAR
     if datagram.port == OUSTER_IMU_PORT or size == OUSTER_IMU_SIZE:
         return UDP_OUSTER_IMU

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 IS_VALID = 1  # bit of a column's status
+MAX_OFFSET_NS = 1_000_000_000  # of a column from its packet; more is damage
 INTENSITIES = ("SIGNAL", "REFLECTIVITY")  # the first that the profile has, as the ROS driver
 
 
@@ -152,12 +153,14 @@ class OusterPackets:
         packet = _trimmed(packet, self._format)
         header, core = self._format.packet_header, self._core
         places = header(core.ColHeader.MEASUREMENT_ID, packet)
-        keep = _is_valid(core, self._format, packet) & (places < self._shape[1])
-        stamps = header(core.ColHeader.TIMESTAMP, packet)[keep].astype(np.int64)
+        is_valid = _is_valid(core, self._format, packet)
+        stamps = header(core.ColHeader.TIMESTAMP, packet).astype(np.int64)
+        offsets_ns = stamps - stamps[is_valid][0]
+        keep = is_valid & (places < self._shape[1]) & (np.abs(offsets_ns) < MAX_OFFSET_NS)
         return _Columns(
             self._format.frame_id(packet),
             places[keep].astype(np.intp),
-            start + (stamps - stamps[:1]) * 1e-9,
+            start + offsets_ns[keep] * 1e-9,
             {
                 name: self._format.packet_field(name, packet)[:, keep]
                 for name in ("RANGE", self._intensity)

@@ -67,7 +67,9 @@ def udp(payload, *, source="192.168.1.201", port=2368, mtu=1500, identity=0):
     for begin in range(0, len(datagram), step):
         part = datagram[begin : begin + step]
         more = 0x2000 if begin + step < len(datagram) else 0
-        head = struct.pack(">BBHHHBBH", 0x45, 0, 20 + len(part), identity, more | begin // 8, 64, 17, 0)
+        head = struct.pack(
+            ">BBHHHBBH", 0x45, 0, 20 + len(part), identity, more | begin // 8, 64, 17, 0
+        )
         packets.append(head + bytes(map(int, source.split("."))) + bytes(4) + part)
     return packets
 
@@ -80,12 +82,12 @@ def ethernet(packet, *, vlan=False, protocol=0x0800):
 def write_pcap(path, frames, *, magic=0xA1B2C3D4, order="<", link=1):
     """Write (stamp in ns, frame) to a capture."""
     unit_ns = 1 if magic == 0xA1B23C4D else 1000
-    content = struct.pack(f"{order}IHHiIII", magic, 2, 4, 0, 0, 65535, link)
+    parts = [struct.pack(f"{order}IHHiIII", magic, 2, 4, 0, 0, 65535, link)]
     for stamp_ns, frame in frames:
         seconds, rest = divmod(stamp_ns, 10**9)
-        content += struct.pack(f"{order}IIII", seconds, rest // unit_ns, len(frame), len(frame))
-        content += frame
-    path.write_bytes(content)
+        size = len(frame)
+        parts += [struct.pack(f"{order}IIII", seconds, rest // unit_ns, size, size), frame]
+    path.write_bytes(b"".join(parts))
     return path
 
 

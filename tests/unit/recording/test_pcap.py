@@ -18,8 +18,12 @@ def read(path):
 
 
 @pytest.mark.parametrize("order", ["<", ">"])
-@pytest.mark.parametrize(("magic", "stamp_ns"), [(0xA1B2C3D4, NS + 123_456_000), (0xA1B23C4D, NS + 123_456_789)])
-def test_a_datagram_comes_with_its_address_port_and_exact_time(tmp_path, packets, order, magic, stamp_ns):
+@pytest.mark.parametrize(
+    ("magic", "stamp_ns"), [(0xA1B2C3D4, NS + 123_456_000), (0xA1B23C4D, NS + 123_456_789)]
+)
+def test_a_datagram_comes_with_its_address_port_and_exact_time(
+    tmp_path, packets, order, magic, stamp_ns
+):
     frames = [(stamp_ns, packets.ethernet(packets.udp(b"hello")[0]))]
     path = packets.write_pcap(tmp_path / "a.pcap", frames, magic=magic, order=order)
     messages, source = read(path)

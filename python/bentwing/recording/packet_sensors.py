@@ -71,8 +71,7 @@ def lidar_packets(
     if topic.type in VELODYNE_TYPES:
         library = _velodyne_decoder(topic.name)
         model = velodyne.find_model(first, lidar.model, topic.name)
-        is_told = lidar.model is not None
-        return functools.partial(velodyne.VelodynePackets, library, model, is_told=is_told)
+        return functools.partial(velodyne.VelodynePackets, library, model, first[-1])
     core = _ouster_core(topic.name)
     info = _ouster_info(core, source, topic, lidar)
     ouster.check(core, info, first, topic.name)

@@ -102,8 +102,10 @@ class MergedSource:
 
     def __init__(self, sources: Sequence[Source]) -> None:
         self._sources = sources
-        self.cdr = sources[0].cdr
-        if any(source.cdr != self.cdr for source in sources):
+        # The datagrams of a capture are in neither encoding.
+        encodings = {source.cdr for source in sources if any(map(_is_ros, source.topics))}
+        self.cdr = True in encodings
+        if len(encodings) > 1:
             msg = "the files mix ROS 1 and ROS 2 recordings: give the parts of one recording only"
             raise RecordingError(msg)
         self.start_ns = min(source.start_ns for source in sources)
@@ -130,6 +132,10 @@ class MergedSource:
         """Close the files."""
         for source in self._sources:
             source.close()
+
+
+def _is_ros(topic: TopicInfo) -> bool:
+    return "/msg/" in topic.type
 
 
 def open_source(paths: Sequence[Path]) -> Source:

@@ -86,16 +86,21 @@ def find_model(packet: bytes, told: VelodyneModel | None, topic: str) -> Velodyn
 
 
 class VelodynePackets:
-    """The packets of one Velodyne in their order."""
+    """The packets of one Velodyne in their order.
+
+    Parameters
+    ----------
+    decoder : the library
+    model : the sensor's
+    sent : number of the model in the packets, which the HDL-32E gives since 2016 only
+    """
 
     period_ns: int | None = HOUR_NS
 
-    def __init__(self, decoder: ModuleType, model: VelodyneModel, *, is_told: bool) -> None:
+    def __init__(self, decoder: ModuleType, model: VelodyneModel, sent: int) -> None:
         self._library = decoder
-        self._number = MODELS[model].number
+        self._number, self._sent = MODELS[model].number, sent
         self._is_alpha = model == "vls128"
-        # The HDL-32E names itself since its firmware of 2016 only.
-        self._is_told = is_told
         config = decoder.Config(
             model=getattr(decoder.Model, MODELS[model].name),
             min_range=0.0,
@@ -108,7 +113,7 @@ class VelodynePackets:
         """Return ns since the top of the hour of the first firing; None for no such packet."""
         if len(packet) != VELODYNE_SIZE or packet[:2] != FLAG:
             return None
-        if packet[-1] != self._number and not self._is_told:
+        if packet[-1] != self._sent:
             return None
         (microseconds,) = struct.unpack_from("<I", packet, VELODYNE_SIZE - 6)
         stamp_ns = int(microseconds) * 1000
@@ -144,7 +149,7 @@ class VelodynePackets:
         return batch.where(np.argsort(batch.times, kind="stable"))
 
     def _named(self, packet: bytes) -> bytes:
-        return packet if packet[-1] == self._number else packet[:-1] + bytes([self._number])
+        return packet if self._sent == self._number else packet[:-1] + bytes([self._number])
 
     def _n_fired(self, packet: bytes) -> int:
         """Return how many lasers fired: 12 blocks of 32, in pairs where there are two returns."""

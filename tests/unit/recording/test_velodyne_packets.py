@@ -96,7 +96,6 @@ def test_of_two_returns_the_strongest_is_kept(tmp_path, packets):
         return 2 * near, near
 
     turns = packets.vlp16_turns(0.2, first_us=START_US, ranges=two, returns=0x39)
-    # Half the columns in a packet, so it takes half the time.
     lidar, recording = read(packets.write_datagrams(tmp_path / "a.pcap", captured(turns)))
     np.testing.assert_allclose(joined(lidar, "points")[:, 0], 4.0, atol=4e-3)
     counts = recording.counts
@@ -175,6 +174,21 @@ def test_beside_an_imu_the_clock_follows_the_computers(tmp_path, packets, ros):
     last_firing = 11 * 110.592e-6 + 55.296e-6 + 15 * 2.304e-6
     last = times[-1] + (recording.start_ns - START_NS) * 1e-9
     assert last == pytest.approx(computers[-1] + last_firing, abs=2e-4)
+
+
+def test_a_capture_and_the_bag_of_an_imu_are_one_recording(tmp_path, packets, ros):
+    turns = packets.vlp16_turns(0.5, first_us=START_US)
+    capture = packets.write_datagrams(tmp_path / "a.pcap", captured(turns))
+    entries = [("/imu", t, ros.imu(t)) for t in np.arange(0, 0.5, 0.01)]
+    bag = ros.write(tmp_path / "a.bag", entries)
+    with Recording([capture, bag], Payload(T_imu_lidar={})) as recording:
+        batches = list(recording.batches())
+    imu = [batch for batch in batches if isinstance(batch, ImuBatch)]
+    lidar = [batch for batch in batches if isinstance(batch, LidarBatch)]
+    assert len(joined(imu, "times")) == 50
+    assert recording.counts["lidar.packets"] == len(turns)
+    assert joined(lidar, "times")[0] == pytest.approx(DELAY_NS * 1e-9, abs=1e-5)
+    assert "put at the computer's time and kept there" in recording.point_times
 
 
 @pytest.mark.parametrize("stamped", [True, False])
@@ -301,7 +315,7 @@ def test_the_points_are_the_same_however_packets_are_grouped(packets):
     data, times = [p for _, p in turns], np.array([t * 1e-6 for t, _ in turns])
 
     def decoded(size):
-        decoder = VelodynePackets(velodyne_decoder, "vlp16", is_told=False)
+        decoder = VelodynePackets(velodyne_decoder, "vlp16", 0x22)
         groups = [slice(i, i + size) for i in range(0, len(data), size)]
         return [decoder.points(data[group], times[group], Counter()) for group in groups]
 

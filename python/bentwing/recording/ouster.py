@@ -126,7 +126,9 @@ class OusterPackets:
         if len(packet) != self._format.lidar_packet_size:
             return None
         stamps = self._format.packet_header(self._core.ColHeader.TIMESTAMP, packet)
-        stamps = stamps[_is_valid(self._core, self._format, packet)]
+        is_valid = _is_valid(self._core, self._format, packet)
+        # Outside the sensor's azimuth window no column is valid, and its stamp may be missing.
+        stamps = stamps[is_valid if is_valid.any() else stamps > 0]
         return int(stamps[0]) if len(stamps) else None
 
     def points(
@@ -155,7 +157,7 @@ class OusterPackets:
         places = header(core.ColHeader.MEASUREMENT_ID, packet)
         is_valid = _is_valid(core, self._format, packet)
         stamps = header(core.ColHeader.TIMESTAMP, packet).astype(np.int64)
-        offsets_ns = stamps - stamps[is_valid][0]
+        offsets_ns = stamps - (self.stamp_ns(packet) or 0)
         keep = is_valid & (places < self._shape[1]) & (np.abs(offsets_ns) < MAX_OFFSET_NS)
         return _Columns(
             self._format.frame_id(packet),

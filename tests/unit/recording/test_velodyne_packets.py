@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from bentwing.errors import RecordingError
+from bentwing.inspection import inspect
 from bentwing.recording import ImuBatch, LidarBatch, Payload, Recording
 
 pytest.importorskip("velodyne_decoder", reason='needs pip install "bentwing[packets]"')
@@ -82,6 +83,13 @@ def test_firings_without_return_are_counted(wall_capture):
     assert 0.6 < counts["lidar.zero"] / counts["lidar.returns"] < 0.72
     assert counts["lidar.packets"] == counts["lidar.messages"] == n_packets
     assert recording.warnings == []
+
+
+def test_the_inspection_finds_a_capture_fit_for_mapping(wall_capture):
+    found = inspect(wall_capture)
+    assert found.is_fit
+    assert [(topic.type, topic.role) for topic in found.topics] == [("udp/velodyne", "lidar")]
+    assert found.topics[0].rate_hz == pytest.approx(1e6 / (12 * 110.592), rel=0.01)
 
 
 def test_batches_are_streamed_a_tenth_of_a_second_each(wall_capture):

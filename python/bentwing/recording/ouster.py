@@ -79,10 +79,27 @@ def check(core: ModuleType, info: Any, packet: bytes, topic: str) -> None:  # no
         found = f"packets of {len(packet)} bytes where the metadata say {form.lidar_packet_size}"
     elif (serial := form.prod_sn(packet)) and info.sn and serial != info.sn:
         found = f"packets of the sensor {serial} where the metadata are of {info.sn}"
+    elif (rate := _column_rate(core, form, packet)) and not _is_near(rate, info.format):
+        found = (
+            f"packets of {rate:.0f} columns per second where the metadata say "
+            f"{info.format.columns_per_frame} x {info.format.fps}"
+        )
     else:
         return
     msg = f"{topic}: {found}; give the metadata saved from this sensor in the mode of the recording"
     raise RecordingError(msg)
+
+
+def _column_rate(core: ModuleType, form: Any, packet: bytes) -> float | None:  # noqa: ANN401
+    stamps = form.packet_header(core.ColHeader.TIMESTAMP, packet)
+    steps = np.diff(stamps[_is_valid(core, form, packet)].astype(np.int64))
+    return 1e9 / float(np.median(steps)) if len(steps) and np.median(steps) > 0 else None
+
+
+def _is_near(rate: float, turn: Any) -> bool:  # noqa: ANN401 - not our type
+    """Whether columns per second are those of a mode; modes differ by a factor of two."""
+    expected = turn.columns_per_frame * turn.fps
+    return bool(0.75 < rate / expected < 1.5)
 
 
 def _trimmed(packet: bytes, form: Any) -> bytes:  # noqa: ANN401 - not our type
@@ -139,9 +156,13 @@ class OusterPackets:
         Parameters
         ----------
         times : (N,) s, of each packet's first valid column
-        counts : receives `returns` (all firings of a laser) and `zero` (those without a return)
+        counts : receives `returns` (all firings of a laser), `zero` (those without a return) and
+            `bad_columns` (out of place or time)
         """
-        columns = [self._columns(*pair) for pair in zip(packets, times.tolist(), strict=True)]
+        columns = [
+            self._columns(packet, start, counts)
+            for packet, start in zip(packets, times.tolist(), strict=True)
+        ]
         turns = itertools.groupby(columns, key=lambda part: part.turn)
         batches = [self._turn(list(parts), counts) for _, parts in turns]
         return LidarBatch(
@@ -151,7 +172,7 @@ class OusterPackets:
             np.concatenate([batch.ring for batch in batches if batch.ring is not None]),
         )
 
-    def _columns(self, packet: bytes, start: float) -> _Columns:
+    def _columns(self, packet: bytes, start: float, counts: Counter[str]) -> _Columns:
         packet = _trimmed(packet, self._format)
         header, core = self._format.packet_header, self._core
         places = header(core.ColHeader.MEASUREMENT_ID, packet)
@@ -159,6 +180,7 @@ class OusterPackets:
         stamps = header(core.ColHeader.TIMESTAMP, packet).astype(np.int64)
         offsets_ns = stamps - (self.stamp_ns(packet) or 0)
         keep = is_valid & (places < self._shape[1]) & (np.abs(offsets_ns) < MAX_OFFSET_NS)
+        counts["bad_columns"] += int((is_valid & ~keep).sum())
         return _Columns(
             self._format.frame_id(packet),
             places[keep].astype(np.intp),

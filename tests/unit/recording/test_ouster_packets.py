@@ -192,17 +192,29 @@ def test_without_metadata_one_sentence_says_how_to_get_them(tmp_path, ros1):
 @pytest.mark.parametrize(
     ("changes", "sentence"),
     [
-        ({"prod_line": "OS-1-64"}, "packets of 6464 bytes where the metadata say"),
+        (
+            {
+                "pixels_per_column": 64,
+                "pixel_shift_by_row": [0] * 64,
+                "beam_altitude_angles": [0.0] * 64,
+                "beam_azimuth_angles": [0.0] * 64,
+                "prod_line": "OS-1-64",
+            },
+            "packets of 6464 bytes where the metadata say 12608",
+        ),
+        (
+            {"lidar_mode": "2048x10", "columns_per_frame": 2048, "column_window": [0, 2047]},
+            "packets of 10240 columns per second where the metadata say 2048 x 10",
+        ),
         (None, "not the metadata of an Ouster sensor"),
     ],
 )
 def test_metadata_that_do_not_fit_are_refused(tmp_path, ros1, changes, sentence):
     text = "{}"
     if changes is not None:
-        other = json.loads(METADATA) | changes
-        other["data_format"] |= {"pixels_per_column": 64, "pixel_shift_by_row": [0] * 64}
-        other["beam_altitude_angles"] = np.linspace(16, -16, 64).tolist()
-        other["beam_azimuth_angles"] = [0.0] * 64
+        other = json.loads(METADATA)
+        for name, value in changes.items():
+            (other["data_format"] if name in other["data_format"] else other)[name] = value
         text = json.dumps(other)
     path = ros1.write(tmp_path / "a.bag", entries(ros1, metadata=text))
     with pytest.raises(RecordingError, match=sentence) as raised:

@@ -17,7 +17,9 @@ pytest.importorskip("velodyne_decoder", reason='needs pip install "bentwing[pack
 
 HEAD = struct.pack("<IHHiIII", 0xA1B2C3D4, 2, 4, 0, 0, 65535, 1)
 models = st.sampled_from([0x21, 0x22, 0x24, 0x28, 0xA1])
-shared_tmp_path = settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+shared_tmp_path = settings(
+    suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None
+)
 
 
 def capture(path, payloads):

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 HOUR_NS = 3_600_000_000_000
 FLAG, LOWER_FLAG = b"\xff\xee", b"\xff\xdd"  # of a block of firings
-DUAL_RETURN = 0x39
+SINGLE_RETURN, DUAL_RETURN = 0x37, 0x39
 STRONGEST = 1  # bit of the decoder's return_type
 MAX_RANGE = 1e6  # m; the usable ranges are the payload's
 
@@ -133,7 +133,7 @@ class VelodynePackets:
         pair = library.velodyne_decoder_pylib.TimePair
         vector = library.PacketVector()
         for packet, t in zip(packets, (times - times[0]).tolist(), strict=True):
-            vector.append(library.VelodynePacket(pair(t, t), self._named(packet)))
+            vector.append(library.VelodynePacket(pair(t, t), self._normal(packet)))
         _, table = self._decoder.decode(vector, as_pcl_structs=True)
         table = table[(table["return_type"] & STRONGEST) != 0]
         n_fired = sum(map(self._n_fired, packets))
@@ -148,8 +148,14 @@ class VelodynePackets:
         )
         return batch.where(np.argsort(batch.times, kind="stable"))
 
-    def _named(self, packet: bytes) -> bytes:
-        return packet if self._sent == self._number else packet[:-1] + bytes([self._number])
+    def _normal(self, packet: bytes) -> bytes:
+        """Return the packet with the model's number, and its one return called the strongest.
+
+        The decoder's result is undefined for the zeros of firmware from before dual returns, and the
+        last return is the only one where the sensor was told to send that.
+        """
+        returns = DUAL_RETURN if packet[-2] == DUAL_RETURN else SINGLE_RETURN
+        return packet[:-2] + bytes([returns, self._number])
 
     def _n_fired(self, packet: bytes) -> int:
         """Return how many lasers fired: 12 blocks of 32, in pairs where there are two returns."""

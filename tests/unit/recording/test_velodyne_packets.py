@@ -111,6 +111,17 @@ def test_of_two_returns_the_strongest_is_kept(tmp_path, packets):
     assert counts["lidar.returns"] - counts["lidar.zero"] == len(joined(lidar, "times"))
 
 
+@pytest.mark.parametrize("returns", [0x38, 0x00])
+def test_the_only_return_is_kept_whatever_it_is_called(tmp_path, packets, returns):
+    """Last return, and firmware from before there was a choice."""
+    turns = packets.vlp16_turns(0.2, first_us=START_US)
+    other = packets.vlp16_turns(0.2, first_us=START_US, returns=returns)
+    expected, _ = read(packets.write_datagrams(tmp_path / "a.pcap", captured(turns)))
+    lidar, recording = read(packets.write_datagrams(tmp_path / "b.pcap", captured(other)))
+    np.testing.assert_array_equal(joined(lidar, "points"), joined(expected, "points"))
+    assert recording.counts["lidar.returns"] == 384 * len(turns)
+
+
 def test_the_top_of_the_hour_is_passed_without_a_step(tmp_path, packets):
     first_us = 3_600_000_000 - 200_000
     start_ns = START_NS // HOUR_NS * HOUR_NS + first_us * 1000

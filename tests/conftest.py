@@ -28,6 +28,8 @@ LIVOX_MSG = (
     "std_msgs/Header header\nuint64 timebase\nuint32 point_num\nuint8 lidar_id\nuint8[3] rsvd\n"
     "livox_ros_driver2/CustomPoint[] points"
 )
+VELODYNE_PACKET = "builtin_interfaces/Time stamp\nuint8[1206] data"
+VELODYNE_SCAN = "std_msgs/Header header\nvelodyne_msgs/VelodynePacket[] packets"
 START = 1_700_000_000  # s, recorder's and header's time of t = 0
 
 
@@ -43,6 +45,9 @@ def _store(ros1: bool):
     store = get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_HUMBLE)
     store.register(get_types_from_msg(LIVOX_POINT, "livox_ros_driver2/msg/CustomPoint"))
     store.register(get_types_from_msg(LIVOX_MSG, "livox_ros_driver2/msg/CustomMsg"))
+    store.register(get_types_from_msg(VELODYNE_PACKET, "velodyne_msgs/msg/VelodynePacket"))
+    store.register(get_types_from_msg(VELODYNE_SCAN, "velodyne_msgs/msg/VelodyneScan"))
+    store.register(get_types_from_msg("uint8[] buf", "ouster_ros/msg/PacketMsg"))
     return store
 
 
@@ -132,6 +137,18 @@ class Messages:
         return self.types["livox_ros_driver2/msg/CustomMsg"](
             self.header(t), timebase, len(rows), 0, np.zeros(3, np.uint8), rows
         )
+
+    def velodyne_scan(self, t, packets):
+        """VelodyneScan of (time in s or None, bytes)."""
+        packet = self.types["velodyne_msgs/msg/VelodynePacket"]
+        rows = [packet(self.header(s).stamp, np.frombuffer(data, np.uint8)) for s, data in packets]
+        return self.types["velodyne_msgs/msg/VelodyneScan"](self.header(t), rows)
+
+    def ouster_packet(self, data: bytes):
+        return self.types["ouster_ros/msg/PacketMsg"](np.frombuffer(data, np.uint8))
+
+    def string(self, text: str):
+        return self.types["std_msgs/msg/String"](text)
 
     def write(self, path: Path, entries, *, kind: str = "bag") -> Path:
         """Write (topic, recorder's time in s, message) to a bag; kind bag, mcap or db3."""

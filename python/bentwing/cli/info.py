@@ -19,7 +19,9 @@ from bentwing.recording import Payload
 def info(
     recording: Annotated[
         list[Path],
-        typer.Argument(help="ROS 1 .bag, ROS 2 bag folder, .db3 or .mcap; several parts of one."),
+        typer.Argument(
+            help="ROS 1 .bag, ROS 2 bag folder, .db3, .mcap or .pcap; several parts of one."
+        ),
     ],
     payload: Annotated[
         Path | None, typer.Option("--payload", "-p", help="payload.yaml of the sensor head.")

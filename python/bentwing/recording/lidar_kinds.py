@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""What is assumed of a lidar from its kind alone: usable ranges and range noise."""
+"""What a payload may call a lidar, and what is assumed of its kind: usable ranges and noise."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 LidarKind = Literal["hokuyo-utm30lx", "vlp16", "ouster", "livox", "hesai", "generic"]
+# The models whose raw packets can be read; needed where the packets do not tell.
+VelodyneModel = Literal["hdl32e", "vlp16", "puck-hires", "vlp32a", "vlp32b", "vlp32c", "vls128"]
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,10 +12,18 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 import numpy as np
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    ValidationError,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
 
 from bentwing.errors import PayloadError
-from bentwing.recording.lidar_kinds import KIND_DEFAULTS, LidarKind
+from bentwing.recording.lidar_kinds import KIND_DEFAULTS, LidarKind, VelodyneModel
 from bentwing.recording.payload_errors import describe
 
 if TYPE_CHECKING:
@@ -82,11 +90,15 @@ class Transform(_Section):
 class Lidar(_Section):
     """The lidar; `topic` None means the only topic of a lidar type in the recording.
 
-    Ranges and `range_sigma` (one standard deviation) are in m and default by `kind`.
+    Ranges and `range_sigma` (one standard deviation) are in m and default by `kind`. For raw
+    packets: `model` of a Velodyne whose packets do not tell, and the file with the `metadata` of an
+    Ouster (JSON; relative to the payload file) where the recording has none.
     """
 
     topic: Topic | None = None
     kind: LidarKind = "generic"
+    model: VelodyneModel | None = None
+    metadata: Annotated[str, Field(min_length=1)] | None = None
     min_range: NonNegative = 0.0
     max_range: Positive = 0.0
     range_sigma: Positive = 0.0
@@ -101,6 +113,12 @@ class Lidar(_Section):
         defaults = KIND_DEFAULTS[kind if kind in get_args(LidarKind) else "generic"]
         names = ("min_range", "max_range", "range_sigma")
         return {name: getattr(defaults, name) for name in names} | data
+
+    @field_validator("metadata")
+    @classmethod
+    def _beside_payload(cls, value: str | None, info: ValidationInfo) -> str | None:
+        folder = (info.context or {}).get("folder")
+        return value if value is None or folder is None else str(folder / value)
 
     @model_validator(mode="after")
     def _ordered_ranges(self) -> Lidar:
@@ -207,7 +225,7 @@ class Payload(_Section):
             msg = f"{path}: expected a mapping of sections (lidar, imu, T_imu_lidar, …), found {type(data).__name__}"
             raise PayloadError(msg)
         try:
-            return cls.model_validate(data)
+            return cls.model_validate(data, context={"folder": Path(path).parent})
         except ValidationError as error:
             raise PayloadError(describe(error, cls, path)) from None
 

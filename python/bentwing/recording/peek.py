@@ -15,6 +15,10 @@ from bentwing.recording import laser_scan, point_cloud2, point_times, wire, wire
 from bentwing.recording.topics import LASER_SCAN, LIVOX, MULTI_ECHO, POINT_CLOUD
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from bentwing.recording.packet_clock import ClockReading
+    from bentwing.recording.packet_sensors import ImuPackets, LidarPackets
     from bentwing.recording.point_times import TimeReading
     from bentwing.recording.scanned import TopicInfo
     from bentwing.recording.source import Source
@@ -34,6 +38,8 @@ class Peek:
     offset_ns : header's minus recorder's time of the first message
     point_times : sentence on how the time of each point is known, None where it is not
     reading : of a PointCloud2's time field
+    packet_clock : what the stamps of raw packets mean
+    lidar_packets, imu_packets : makers of the decoder for raw packets, the one of the role
     """
 
     topic: TopicInfo
@@ -42,6 +48,9 @@ class Peek:
     offset_ns: int
     point_times: str | None = None
     reading: TimeReading | None = None
+    packet_clock: ClockReading | None = None
+    lidar_packets: Callable[[], LidarPackets] | None = None
+    imu_packets: Callable[[], ImuPackets] | None = None
 
 
 def peek(source: Source, topic: TopicInfo) -> Peek:
@@ -62,11 +71,7 @@ def peek(source: Source, topic: TopicInfo) -> Peek:
         headers.append((header_ns, recorder_ns))
         messages.append(raw)
     if not messages:
-        msg = (
-            f"topic {topic.name}: none of its first messages can be read as {topic.type}; the "
-            "recording is damaged or its type is not what it says, record it again"
-        )
-        raise RecordingError(msg)
+        raise unreadable(topic)
     use_recorder_time = all(header_ns == 0 for header_ns, _ in headers)
     stamps_ns = [recorder if use_recorder_time else header for header, recorder in headers]
     sentence, reading = _point_times(topic, messages, stamps_ns, cdr=source.cdr)
@@ -74,6 +79,14 @@ def peek(source: Source, topic: TopicInfo) -> Peek:
     offset_ns = 0 if use_recorder_time else headers[0][0] - headers[0][1]
     first_ns = min(stamps_ns) + int(np.floor(early * 1e9))
     return Peek(topic, use_recorder_time, first_ns, offset_ns, sentence, reading)
+
+
+def unreadable(topic: TopicInfo) -> RecordingError:
+    """Return the error for a topic none of whose first messages can be read."""
+    return RecordingError(
+        f"topic {topic.name}: none of its first messages can be read as {topic.type}; the "
+        "recording is damaged or its type is not what it says, record it again"
+    )
 
 
 def _point_times(

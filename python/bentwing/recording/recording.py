@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING
 from bentwing.clock import NS_PER_S, Clock
 from bentwing.errors import PayloadError, RecordingError
 from bentwing.recording import imu_units, problems
-from bentwing.recording.lidar_stream import LidarStream
+from bentwing.recording.open_streams import open_streams
+from bentwing.recording.packet_peek import peek_imu, peek_lidar
 from bentwing.recording.payload import Payload
 from bentwing.recording.peek import Peek, peek
 from bentwing.recording.slots import group_into_slots, trimmed
 from bentwing.recording.source import open_source
 from bentwing.recording.stream_warnings import stream_warnings
-from bentwing.recording.streams import EncoderStream, ImuStream
-from bentwing.recording.topics import resolve
+from bentwing.recording.topics import PACKET_TYPES, resolve
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -70,14 +70,22 @@ class Recording:
 
     def _survey(self) -> None:
         roles = resolve(self._source.topics, self.payload)
-        self._peeks: dict[str, Peek] = {
-            role: peek(self._source, topic)
-            for role, topic in roles._asdict().items()
-            if topic is not None
-        }
+        found = {role: topic for role, topic in roles._asdict().items() if topic is not None}
+        is_alone = all(topic.type in PACKET_TYPES for topic in found.values())
+        self._peeks: dict[str, Peek] = {}
+        for role, topic in found.items():
+            self._peeks[role] = self._peek(role, topic, is_alone=is_alone)
         self.clock = Clock(min(found.first_ns for found in self._peeks.values()))
         if self.strict:
             self._check_fitness()
+
+    def _peek(self, role: str, topic: TopicInfo, *, is_alone: bool) -> Peek:
+        if topic.type not in PACKET_TYPES:
+            return peek(self._source, topic)
+        if role == "lidar":
+            return peek_lidar(self._source, topic, self.payload.lidar, is_alone=is_alone)
+        clock = self._peeks["lidar"].packet_clock
+        return peek_imu(self._source, topic, self.payload.lidar, clock)
 
     def _check_fitness(self) -> None:
         if "imu" in self._peeks and not self.payload.places_lidar_on_imu:
@@ -106,7 +114,7 @@ class Recording:
 
     def _first_imu_batches(self) -> Iterator[Batch]:
         """Yield the IMU's samples alone, in a pass of their own that leaves the counts as is."""
-        streams = {self._peeks["imu"].topic.name: self._stream("imu")}
+        streams = {self._peeks["imu"].topic.name: self._open_streams(["imu"])["imu"]}
         messages = self._source.messages(streams)
         return group_into_slots(messages, streams)
 
@@ -236,8 +244,7 @@ class Recording:
         end = float("inf") if duration is None else begin + duration
         order: tuple[str, ...] = ("encoder", "imu", "lidar")
         roles = [role for role in order if role in self._peeks]
-        streams = {role: self._stream(role) for role in roles}
-        self._streams = streams
+        self._streams = streams = self._open_streams(roles)
         by_topic = {self._peeks[role].topic.name: stream for role, stream in streams.items()}
         messages = self._source.messages(set(by_topic), self._seek_ns(begin))
         n_points = 0
@@ -258,22 +265,9 @@ class Recording:
             return None
         return self._source.start_ns + int((end + SEEK_MARGIN) * NS_PER_S)
 
-    def _stream(self, role: str) -> Stream:
-        found = self._peeks[role]
-        name, cdr, zero = found.topic.name, self._source.cdr, found.use_recorder_time
-        if role == "imu":
-            return ImuStream(name, self.clock, cdr=cdr, use_recorder_time=zero)
-        if role == "encoder":
-            return EncoderStream(name, self.clock, cdr=cdr, use_recorder_time=zero)
-        return LidarStream(
-            name,
-            found.topic.type,
-            self.clock,
-            cdr=cdr,
-            use_recorder_time=zero,
-            reading=found.reading,
-            needs_beam_times=self.strict,
-        )
+    def _open_streams(self, roles: Sequence[str]) -> dict[str, Stream]:
+        cdr, strict = self._source.cdr, self.strict
+        return open_streams(self._peeks, roles, self.clock, cdr=cdr, needs_beam_times=strict)
 
     def _topic(self, role: str) -> str | None:
         return self._peeks[role].topic.name if role in self._peeks else None

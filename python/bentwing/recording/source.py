@@ -13,6 +13,7 @@ from rosbags.rosbag2 import Reader as Rosbag2Reader
 from bentwing.errors import RecordingError
 from bentwing.recording.bag_recovery import scan_bag
 from bentwing.recording.mcap_scan import scan_mcap
+from bentwing.recording.pcap_scan import check_pcap, scan_pcap
 from bentwing.recording.scanned import ScannedSource, TopicInfo
 
 if TYPE_CHECKING:
@@ -20,8 +21,9 @@ if TYPE_CHECKING:
 
     from rosbags.interfaces import Connection
 
-SUFFIXES = (".bag", ".mcap", ".db3")
-EXPECTED = "give a ROS 1 .bag, a ROS 2 bag folder, a .db3 or a .mcap file"
+PCAP_SUFFIXES = (".pcap", ".pcapng")
+SUFFIXES = (".bag", ".mcap", ".db3", *PCAP_SUFFIXES)
+EXPECTED = "give a ROS 1 .bag, a ROS 2 bag folder, a .db3, a .mcap or a .pcap file"
 
 
 class Source(Protocol):
@@ -100,8 +102,10 @@ class MergedSource:
 
     def __init__(self, sources: Sequence[Source]) -> None:
         self._sources = sources
-        self.cdr = sources[0].cdr
-        if any(source.cdr != self.cdr for source in sources):
+        # The datagrams of a capture are in neither encoding.
+        encodings = {source.cdr for source in sources if any(map(_is_ros, source.topics))}
+        self.cdr = True in encodings
+        if len(encodings) > 1:
             msg = "the files mix ROS 1 and ROS 2 recordings: give the parts of one recording only"
             raise RecordingError(msg)
         self.start_ns = min(source.start_ns for source in sources)
@@ -128,6 +132,10 @@ class MergedSource:
         """Close the files."""
         for source in self._sources:
             source.close()
+
+
+def _is_ros(topic: TopicInfo) -> bool:
+    return "/msg/" in topic.type
 
 
 def open_source(paths: Sequence[Path]) -> Source:
@@ -173,6 +181,8 @@ def _open_one(path: Path) -> Source:
     if not path.is_dir() and path.suffix not in SUFFIXES:
         msg = f"{path}: not a known kind of recording; {EXPECTED}"
         raise RecordingError(msg)
+    if not path.is_dir() and path.suffix in PCAP_SUFFIXES:
+        return _open_pcap(path)
     try:
         return RosbagsSource(path)
     except PermissionError as error:
@@ -181,6 +191,15 @@ def _open_one(path: Path) -> Source:
     # Hostile and truncated files raise anything from struct.error to AssertionError.
     except Exception as error:
         return _scan_instead(path, str(error) or type(error).__name__)
+
+
+def _open_pcap(path: Path) -> Source:
+    check_pcap(path)
+    source = ScannedSource(path, scan_pcap)
+    if not source.topics:
+        msg = f"{path}: a capture without a single frame; check that the lidar was sending"
+        raise RecordingError(msg)
+    return source
 
 
 def _scan_instead(path: Path, reason: str) -> Source:

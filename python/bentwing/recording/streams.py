@@ -15,6 +15,8 @@ from bentwing.recording.stamps import StampMonitor
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from numpy.typing import NDArray
+
     from bentwing.clock import Clock
     from bentwing.recording.batches import Batch
 
@@ -60,23 +62,27 @@ class ImuStream:
         self.counts["samples"] += len(stamps_ns)
         values = np.frombuffer(b"".join(bodies), "<f8").reshape(-1, 37).astype(np.float64)
         gyro, accel = values[:, 13:16], values[:, 25:28]
-        keep = self._usable(gyro, accel)
+        keep = usable_samples(gyro, accel, self.counts)
         if not keep.any():
             return None
         times = self._clock.to_seconds(np.array(stamps_ns, dtype=np.int64)[keep])
         return ImuBatch(times, np.ascontiguousarray(gyro[keep]), np.ascontiguousarray(accel[keep]))
 
-    def _usable(self, gyro: np.ndarray, accel: np.ndarray) -> np.ndarray:
-        both = np.hstack([gyro, accel])
-        is_finite = np.isfinite(both).all(axis=1)
-        self.counts["nan"] += int((~is_finite).sum())
-        with np.errstate(invalid="ignore"):
-            is_small = (np.abs(both) < MAX_IMU_VALUE).all(axis=1)
-        self.counts["out_of_range"] += int((is_finite & ~is_small).sum())
-        return np.asarray(is_finite & is_small)
-
     def finish(self) -> None:
         """Nothing is held back."""
+
+
+def usable_samples(
+    gyro: NDArray[np.float64], accel: NDArray[np.float64], counts: Counter[str]
+) -> NDArray[np.bool_]:
+    """Return which samples (M,) can be meant, and count `nan` and `out_of_range`."""
+    both = np.hstack([gyro, accel])
+    is_finite = np.isfinite(both).all(axis=1)
+    counts["nan"] += int((~is_finite).sum())
+    with np.errstate(invalid="ignore"):
+        is_small = (np.abs(both) < MAX_IMU_VALUE).all(axis=1)
+    counts["out_of_range"] += int((is_finite & ~is_small).sum())
+    return np.asarray(is_finite & is_small)
 
 
 class EncoderStream:

@@ -17,9 +17,29 @@ LASER_SCAN = "sensor_msgs/msg/LaserScan"
 MULTI_ECHO = "sensor_msgs/msg/MultiEchoLaserScan"
 POINT_CLOUD = "sensor_msgs/msg/PointCloud2"
 LIVOX = ("livox_ros_driver/msg/CustomMsg", "livox_ros_driver2/msg/CustomMsg")
-LIDAR_TYPES = (LASER_SCAN, MULTI_ECHO, POINT_CLOUD, *LIVOX)
-IMU_TYPES = ("sensor_msgs/msg/Imu",)
-ENCODER_TYPES = ("sensor_msgs/msg/JointState",)
+IMU = "sensor_msgs/msg/Imu"
+VELODYNE_SCAN = "velodyne_msgs/msg/VelodyneScan"
+# Both of the lidar's packets and of those of its IMU; the topic's name tells which.
+OUSTER_PACKETS = (
+    "ouster_ros/msg/PacketMsg",
+    "ouster_sensor_msgs/msg/PacketMsg",
+    "ouster_msgs/msg/PacketMsg",
+)
+# Datagrams in a pcap.
+UDP_VELODYNE, UDP_OUSTER_LIDAR = "udp/velodyne", "udp/ouster_lidar"
+UDP_OUSTER_IMU = "udp/ouster_imu"
+STRING = "std_msgs/msg/String"
+VELODYNE_TYPES = (VELODYNE_SCAN, UDP_VELODYNE)
+OUSTER_TYPES = (*OUSTER_PACKETS, UDP_OUSTER_LIDAR, UDP_OUSTER_IMU)
+PACKET_TYPES = (*VELODYNE_TYPES, *OUSTER_TYPES)
+# By preference: where a driver recorded both, its decoded messages need nothing else.
+LIDAR_TYPES = (
+    (LASER_SCAN, MULTI_ECHO, POINT_CLOUD, *LIVOX),
+    (*VELODYNE_TYPES, *OUSTER_PACKETS, UDP_OUSTER_LIDAR),
+)
+IMU_TYPES = ((IMU,), (*OUSTER_PACKETS, UDP_OUSTER_IMU))
+JOINT_STATE = "sensor_msgs/msg/JointState"
+ENCODER_TYPES = ((JOINT_STATE,),)
 
 
 class Roles(NamedTuple):
@@ -41,7 +61,7 @@ def resolve(topics: Sequence[TopicInfo], payload: Payload) -> Roles:
     lidar = _one(topics, "lidar", LIDAR_TYPES, payload.lidar.topic)
     if lidar is None:
         msg = (
-            f"no lidar topic: expected one of the types {', '.join(LIDAR_TYPES)}, "
+            f"no lidar topic: expected one of the types {_joined(LIDAR_TYPES)}, "
             f"the recording has {_listed(topics)}"
         )
         raise RecordingError(msg)
@@ -51,20 +71,22 @@ def resolve(topics: Sequence[TopicInfo], payload: Payload) -> Roles:
         if encoder is None:
             msg = (
                 "the payload describes an encoder, but the recording has no topic of type "
-                f"{ENCODER_TYPES[0]} (it has {_listed(topics)}); record the encoder, or remove "
+                f"{JOINT_STATE} (it has {_listed(topics)}); record the encoder, or remove "
                 "'encoder' from the payload if the lidar does not turn"
             )
             raise RecordingError(msg)
-    return Roles(lidar, _imu(topics, payload), encoder)
+    return Roles(lidar, _imu(topics, payload, lidar), encoder)
 
 
-def _imu(topics: Sequence[TopicInfo], payload: Payload) -> TopicInfo | None:
+def _imu(topics: Sequence[TopicInfo], payload: Payload, lidar: TopicInfo) -> TopicInfo | None:
     if payload.imu is None:
         return None
-    imu = _one(topics, "imu", IMU_TYPES, payload.imu.topic)
+    # The IMU in the lidar is not used unasked where the lidar itself does not need its decoder.
+    is_asked = payload.imu.topic is not None or lidar.type in OUSTER_TYPES
+    imu = _one(topics, "imu", IMU_TYPES if is_asked else IMU_TYPES[:1], payload.imu.topic)
     if imu is None and payload.describes_imu:
         msg = (
-            f"the payload describes an IMU, but the recording has no topic of type {IMU_TYPES[0]} "
+            f"the payload describes an IMU, but the recording has no topic of type {IMU} "
             f"(it has {_listed(topics)}); record the IMU, or write 'imu: null' and remove "
             "T_imu_lidar to map with the lidar alone"
         )
@@ -73,23 +95,31 @@ def _imu(topics: Sequence[TopicInfo], payload: Payload) -> TopicInfo | None:
 
 
 def _one(
-    topics: Sequence[TopicInfo], role: str, types: Sequence[str], name: str | None
+    topics: Sequence[TopicInfo], role: str, types: Sequence[Sequence[str]], name: str | None
 ) -> TopicInfo | None:
-    """Return the topic named, or the only one of the right type that has messages."""
+    """Return the topic named, or the only one of the preferred types that has messages."""
     if name is not None:
         return _named(topics, role, types, name)
-    candidates = [topic for topic in topics if topic.type in types]
-    filled = [topic for topic in candidates if topic.count] or candidates
-    if len(filled) > 1:
+    groups = [[topic for topic in topics if _plays(topic, role, group)] for group in types]
+    filled = [found for group in groups if (found := [topic for topic in group if topic.count])]
+    candidates = next(iter([*filled, *filter(None, groups)]), [])
+    if len(candidates) > 1:
         msg = (
-            f"{len(filled)} topics could be the {role}: {_listed(filled)}; "
+            f"{len(candidates)} topics could be the {role}: {_listed(candidates)}; "
             f"name one in the payload under '{role}: {{topic: ...}}'"
         )
         raise RecordingError(msg)
-    return _filled(filled[0], role) if filled else None
+    return _filled(candidates[0], role) if candidates else None
 
 
-def _named(topics: Sequence[TopicInfo], role: str, types: Sequence[str], name: str) -> TopicInfo:
+def _plays(topic: TopicInfo, role: str, types: Sequence[str]) -> bool:
+    is_other_half = topic.type in OUSTER_PACKETS and role not in topic.name.rpartition("/")[2]
+    return topic.type in types and not is_other_half
+
+
+def _named(
+    topics: Sequence[TopicInfo], role: str, types: Sequence[Sequence[str]], name: str
+) -> TopicInfo:
     # ROS 1 drivers publish both spellings of the same name.
     found = next((topic for topic in topics if topic.name.strip("/") == name.strip("/")), None)
     if found is None:
@@ -98,10 +128,10 @@ def _named(topics: Sequence[TopicInfo], role: str, types: Sequence[str], name: s
             f"(it has {_listed(topics)}); correct '{role}: {{topic: ...}}' in the payload"
         )
         raise RecordingError(msg)
-    if found.type not in types:
+    if not any(found.type in group for group in types):
         msg = (
             f"topic {found.name} has the type {found.type or 'unknown'}, which cannot be read as "
-            f"{role}; supported are {', '.join(types)}"
+            f"{role}; supported are {_joined(types)}"
         )
         raise RecordingError(msg)
     return _filled(found, role)
@@ -115,6 +145,10 @@ def _filled(topic: TopicInfo, role: str) -> TopicInfo:
         )
         raise RecordingError(msg)
     return topic
+
+
+def _joined(types: Sequence[Sequence[str]]) -> str:
+    return ", ".join(kind for group in types for kind in group)
 
 
 def _listed(topics: Sequence[TopicInfo]) -> str:

@@ -140,3 +140,16 @@ def test_the_matrix_turns_as_the_hamilton_quaternion_says(tmp_path):
     text = f"T_imu_lidar: {{quaternion: [0, 0, {half}, {half}]}}"
     R = load(tmp_path, text).T_imu_lidar.matrix[:3, :3]
     np.testing.assert_allclose(R @ [1, 0, 0], [0, 1, 0], atol=1e-12)
+
+
+def test_metadata_lie_beside_the_payload_file(tmp_path):
+    payload = load(tmp_path, "lidar: {kind: ouster, metadata: os1.json}")
+    assert payload.lidar.metadata == str(tmp_path / "os1.json")
+    assert load(tmp_path, "lidar: {metadata: /data/os1.json}").lidar.metadata == "/data/os1.json"
+
+
+def test_an_unknown_model_is_refused(tmp_path):
+    message = refusal(tmp_path, "lidar: {model: vlp-16}")
+    assert message.startswith("lidar.model: ")
+    assert "'vlp16'" in message
+    assert message.endswith("found 'vlp-16'")

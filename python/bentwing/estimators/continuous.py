@@ -74,14 +74,14 @@ class Continuous:
         """Hold the next batch for `step`."""
         self._buffer.add(batch)
 
-    def step(self) -> OdometryPass | None:
+    def step(self, *, finishing: bool = False) -> OdometryPass | None:
         """Register one window that has become complete; returns its pass, None without any.
 
         While a rehearsal is repeated, the rehearsed pass goes on first, so that the newest pose
-        never becomes old. The result is that of `feed`.
+        never becomes old. The result is that of `feed`; `finishing` as `result` does.
         """
-        ready = self._ready_until(finishing=False)
-        if ready is None or (self._start is None and not self._begin(ready, finishing=False)):
+        ready = self._ready_until(finishing=finishing)
+        if ready is None or (self._start is None and not self._begin(ready, finishing=finishing)):
             return None
         ahead, shift = self._ahead, self._sliding.shift
         if ahead is not None and ahead.end + shift <= ready:
@@ -91,7 +91,7 @@ class Continuous:
                 self._ahead = None
             else:
                 return ahead
-        return self._pass if self._step(ready, finishing=False) else None
+        return self._pass if self._step(ready, finishing=finishing) else None
 
     def result(self) -> Estimate:
         """Finish with what was fed so far.

@@ -84,18 +84,26 @@ class Prediction:
 
     def pose(self, at: float, imu: ImuTail) -> StampedPose:
         """Return the pose at a time from `start` on; without inertial samples at constant velocity."""
-        if at <= self.recent.times[-1]:
-            return _at(self.recent, at, self.registered_until)
-        if len(imu):
-            samples = self._carried_to(at, imu)
+        recent = self.recent
+        if at <= recent.times[-1]:
+            times, positions, quats = recent.times, recent.positions, recent.quats_xyzw
         else:
-            samples, _ = self._carried.extended(None, self._slow, at + DT)
-        n = min(len(samples), int((samples.end - at) / DT) + 2)
-        times = samples.end + DT * np.arange(1 - n, 1, dtype=np.float64)
-        ahead = Trajectory(times, samples.positions[-n:], samples.quats_xyzw[-n:])
-        return _at(ahead, at, self.registered_until)
+            ahead = self._carried_to(at, imu)
+            positions, quats = ahead.positions, ahead.quats_xyzw
+            times = ahead.start + DT * np.arange(len(positions), dtype=np.float64)
+        i = min(max(int((at - times[0]) / DT), 0), len(times) - 2)
+        share = np.asarray((at - times[i]) / DT)
+        return StampedPose(
+            at,
+            positions[i] + share * (positions[i + 1] - positions[i]),
+            geometry.slerp(quats[i], quats[i + 1], share),
+            (positions[i + 1] - positions[i]) / DT,
+            max(0.0, at - self.registered_until),
+        )
 
     def _carried_to(self, at: float, imu: ImuTail) -> _core.Samples:
+        if not len(imu):
+            return self._carried.extended(None, self._slow, at + DT)[0]
         batch = imu.since(self._carried.end - OVERLAP)
         times, gyro, accel = batch.times, batch.gyro, batch.accel
         if imu.end > self._carried.end + DT:
@@ -121,12 +129,7 @@ def past_pose(trajectory: Trajectory, at: float) -> StampedPose:
     if not at >= first:
         msg = f"at: {at:.3f} s is before the first pose at {first:.3f} s"
         raise ValueError(msg)
-    return _at(trajectory, at, at)
-
-
-def _at(trajectory: Trajectory, at: float, registered_until: float) -> StampedPose:
     positions, quats = trajectory.interpolate(np.array([at]))
-    times = trajectory.times
-    i = int(np.clip(np.searchsorted(times, at, side="right"), 1, len(times) - 1))
-    velocity = (trajectory.positions[i] - trajectory.positions[i - 1]) / (times[i] - times[i - 1])
-    return StampedPose(at, positions[0], quats[0], velocity, max(0.0, at - registered_until))
+    i = min(int((at - first) / DT), len(trajectory.times) - 2)
+    velocity = (trajectory.positions[i + 1] - trajectory.positions[i]) / DT
+    return StampedPose(at, positions[0], quats[0], velocity, 0.0)

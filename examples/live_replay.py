@@ -150,7 +150,11 @@ def height_colors(heights: np.ndarray) -> np.ndarray:
 def watch(
     odometry: bentwing.Odometry, replay: Replay, viewer: Viewer
 ) -> tuple[list[StampedPose], np.ndarray]:
-    """Ask for the pose until nothing more comes; returns poses, and when and how long each took."""
+    """Ask for the pose until nothing more comes.
+
+    Returns poses and for each when it was had, how long the call took, both s, and whether the
+    calibration was known.
+    """
     poses, calls = [], []
     turn = time.perf_counter()
     while not replay.done.is_set():
@@ -162,7 +166,7 @@ def watch(
         pose = odometry.pose()
         after = time.perf_counter()
         poses.append(pose)
-        calls.append((after, after - before))
+        calls.append((after, after - before, odometry.status != "initializing"))
         viewer.show(odometry, pose)
     return poses, np.array(calls)
 
@@ -175,46 +179,38 @@ def report(poses: list[StampedPose], calls: np.ndarray, fed: list[tuple[float, f
     first = np.searchsorted(registered, stamps)
     seen = (first < len(registered)) & (stamps > registered[0])
     print(f"first pose     {poses[0].time:8.2f} s after the first sample")
-    print(f"{'':32s}{'p50':>9s}{'p95':>9s}{'p99':>9s}{'max':>9s}")
+    print(f"{'':38s}{'p50':>9s}{'p95':>9s}{'p99':>9s}{'max':>9s}")
     print_row("one call of pose()", "ms", calls[:, 1] * 1e3)
     print_row("age of the newest window", "s", ages)
     print_row("from a scan to a pose that has it", "s", calls[first[seen], 0] - fed_at[seen])
 
 
-def report_error(poses: list[StampedPose], final: Trajectory, truth: Trajectory) -> None:
-    """Print how far the poses were from the truth, and from one another."""
-    alignment = absolute_error(final, truth).alignment
+def report_error(
+    poses: list[StampedPose], learned: np.ndarray, final: Trajectory, truth: Trajectory
+) -> None:
+    """Print how far the poses were from the truth, and how they stepped at new windows."""
     times, index = np.unique([pose.time for pose in poses], return_index=True)
     known = truth.covers(times)
-    chosen = [poses[i] for i in index[known]]
-    placed = alignment.apply(
-        Trajectory(
-            times[known],
-            np.array([pose.position for pose in chosen]),
-            np.array([pose.quat_xyzw for pose in chosen]),
-        )
-    )
-    right, _ = truth.interpolate(times[known])
-    errors = np.linalg.norm(placed.positions - right, axis=1)
-    ages = np.array([pose.predicted for pose in chosen])
-    print_row("error of the pose", "mm", errors * 1e3)
-    for low, high in ((0.0, 0.5), (0.5, 1.0), (1.0, 2.0)):
-        some = (ages >= low) & (ages < high)
-        if some.any():
-            print_row(f"  predicted by {low:g} to {high:g} s", "mm", errors[some] * 1e3)
-    velocity = np.array([pose.velocity for pose in chosen])
-    step = (
-        np.diff(placed.positions, axis=0)
-        - (velocity[1:] @ alignment.R.T) * np.diff(placed.times)[:, None]
-    )
-    newer = np.diff(placed.times - ages) > 1e-3
-    print_row("step at a new window", "mm", np.linalg.norm(step[newer], axis=1) * 1e3)
+    times, index = times[known], index[known]
+    chosen, learned = [poses[i] for i in index], learned[index]
+    positions = np.array([pose.position for pose in chosen])
+    alignment = absolute_error(final, truth).alignment
+    right, _ = truth.interpolate(times)
+    errors = np.linalg.norm(positions @ alignment.R.T + alignment.t - right, axis=1)
+    expected = np.array([pose.velocity for pose in chosen])[1:] * np.diff(times)[:, None]
+    steps = np.linalg.norm(np.diff(positions, axis=0) - expected, axis=1)
+    newer = np.diff(times - [pose.predicted for pose in chosen]) > 1e-3
+    for when, some in (("initializing", ~learned), ("afterwards", learned)):
+        print_row(f"error of the pose, {when}", "mm", errors[some] * 1e3)
+        print_row(f"step at a window, {when}", "mm", steps[newer & some[1:]] * 1e3)
 
 
 def print_row(name: str, unit: str, values: np.ndarray) -> None:
     """Print percentiles."""
+    if not len(values):
+        return
     numbers = "".join(f"{v:9.3f}" for v in (*np.percentile(values, [50, 95, 99]), values.max()))
-    print(f"{f'{name}, {unit}':32s}{numbers}")
+    print(f"{f'{name}, {unit}':38s}{numbers}")
 
 
 def main() -> None:
@@ -247,7 +243,7 @@ def main() -> None:
         print(f"{len(odometry.map_points())} points in the map; {odometry.counts}")
         if asked.reference_trajectory is not None:
             truth, _ = read_tum(asked.reference_trajectory, recording.clock.start_ns)
-            report_error(poses, final, truth)
+            report_error(poses, calls[:, 2] > 0, final, truth)
 
 
 if __name__ == "__main__":

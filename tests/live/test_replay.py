@@ -27,7 +27,7 @@ def test_a_replay_at_full_speed_gives_the_same_bytes(new, flight, estimate, all_
 def test_a_motor_turned_lidar_gives_the_same_bytes(
     simulated, all_bytes, offline, read_flight, quick
 ):
-    flight = read_flight(simulated("office", 16.0, head="vlp16-motor"), length=14.0, thinning=10)
+    flight = read_flight(simulated("office", 22.0, head="vlp16-motor"), length=14.0, thinning=10)
     assert flight.payload.encoder is not None
     with Odometry(flight.payload, settings=quick, threads=1, max_lag=np.inf) as odometry:
         for piece in flight.pieces:

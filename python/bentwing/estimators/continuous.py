@@ -33,6 +33,9 @@ if TYPE_CHECKING:
 
 # A rest shorter than this is waited out before the start is judged, s.
 LOOK_AHEAD = 6.0
+# Where data comes faster than it is registered, the repetition is given up this many rehearsals
+# after the start: what was learned is used all the same, and the buffer must not grow.
+LATEST_REPETITION = 4.0
 # A start in motion is rehearsed over these stretches first, s: velocity, then attitude.
 MOVING_REHEARSALS = (2.0, 5.0)
 
@@ -64,6 +67,7 @@ class Continuous:
         # A rehearsed pass, until the pass that repeats it has caught up.
         self._ahead: OdometryPass | None = None
         self._rehearsals: tuple[float, ...] = ()
+        self._notes: list[str] = []
 
     def feed(self, batch: Batch) -> None:
         """Take the next batch; windows that have become complete are registered."""
@@ -90,6 +94,7 @@ class Continuous:
             except EstimationError:  # what counts is the pass that follows
                 self._ahead = None
             else:
+                self._give_up_repeating(ahead)
                 return ahead
         return self._pass if self._step(ready, finishing=finishing) else None
 
@@ -258,6 +263,16 @@ class Continuous:
             self._buffer.forget(end - self._sliding.window - 1.0)
         return True
 
+    def _give_up_repeating(self, ahead: OdometryPass) -> None:
+        longest = LATEST_REPETITION * self.settings.rehearsal
+        if self._start is None or ahead.end - self._start.hold < longest:
+            return
+        self._pass, self._ahead, self._rehearsals = ahead, None, ()
+        self._notes.append(
+            f"the first {self.settings.rehearsal:g} s could not be repeated within {longest:g} s: "
+            "windows take too long here; give fewer points or a larger shift"
+        )
+
     def estimate(self, last: OdometryPass) -> Estimate:
         """Return what a pass says, levelled."""
         times, positions, quats = last.trajectory()
@@ -285,7 +300,7 @@ class Continuous:
                 "estimate.samples_without_imu": last.n_blind,
             },
             timings=last.timings,
-            warnings=_warnings(last),
+            warnings=_warnings(last) + self._notes,
         )
 
 

@@ -2,7 +2,8 @@
 """Live use: batches as the sensors deliver them in, the pose now and the map so far out."""
 
 from bentwing.live.live_map import MapUpdate
-from bentwing.live.odometry import Odometry, Status
+from bentwing.live.odometry import Odometry
 from bentwing.live.prediction import StampedPose
+from bentwing.live.status import Status
 
 __all__ = ["MapUpdate", "Odometry", "StampedPose", "Status"]

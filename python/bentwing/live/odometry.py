@@ -7,7 +7,7 @@ import weakref
 from collections import Counter
 from functools import partial
 from threading import Lock
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from bentwing.live.inputs import InputOrder
 from bentwing.live.live_map import LiveMap, MapUpdate
 from bentwing.live.prediction import StampedPose, past_pose
 from bentwing.live.state import LiveState, Registered
+from bentwing.live.status import Status, status_of
 from bentwing.live.worker import Worker
 from bentwing.preprocess import Preprocessing
 from bentwing.recording import ImuBatch, LidarBatch, Payload
@@ -32,8 +33,6 @@ if TYPE_CHECKING:
     from bentwing.estimators.settings import ContinuousSettings
     from bentwing.recording import Batch
     from bentwing.trajectory import Trajectory
-
-Status = Literal["waiting", "initializing", "tracking", "degenerate", "failed"]
 
 
 class Odometry:
@@ -234,16 +233,13 @@ class Odometry:
         `waiting` for the end of the rest, or for the six seconds in which it is looked for: no pose
         yet. `initializing`: poses, but latency, mount and biases are still being learned.
         `tracking`. `degenerate`: the surfaces of the last window leave a direction unseen, the IMU
-        carries it. `failed`: feeding and reading raise why.
+        carries it. `coasting`: there was no window for longer than two shifts, the lidar is silent or
+        registration too slow; the IMU alone carries the pose. `failed`: feeding and reading raise why.
         """
-        newest = self._state.newest
         if self._worker.error is not None:
             return "failed"
-        if newest is None:
-            return "waiting"
-        if newest.rehearsing:
-            return "initializing"
-        return "degenerate" if newest.done.windows[-1]["degenerate"] else "tracking"
+        age = self._state.age(self._newest_point)
+        return status_of(self._state.newest, age, self._engine.settings.shift)
 
     @property
     def health(self) -> dict[str, Any] | None:

@@ -85,8 +85,7 @@ class LiveState:
         """
         with self._lock:
             prediction = self.require().prediction
-            data_end = self._imu.end if len(self._imu) else newest_point
-            newest = max(data_end, float(prediction.recent.times[-1]))
+            newest = max(self._data_end(newest_point), float(prediction.recent.times[-1]))
             at = newest if at is None else at
             if not at <= newest + MAX_EXTRAPOLATION:
                 msg = (
@@ -95,6 +94,15 @@ class LiveState:
                 )
                 raise ValueError(msg)
             return prediction.pose(at, self._imu) if at >= prediction.start else None
+
+    def age(self, newest_point: float) -> float:
+        """Return how much newer than the last window the newest data is, s; 0 without a window."""
+        with self._lock:
+            newest = self._newest
+            return 0.0 if newest is None else self._data_end(newest_point) - newest.done.end
+
+    def _data_end(self, newest_point: float) -> float:
+        return self._imu.end if len(self._imu) else newest_point
 
     def require(self) -> Registered:
         """Return the newest registered window.

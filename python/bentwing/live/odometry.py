@@ -13,6 +13,7 @@ import numpy as np
 
 from bentwing.errors import UsageError
 from bentwing.estimators import Continuous
+from bentwing.live.backlog import Backlog
 from bentwing.live.inputs import InputOrder
 from bentwing.live.live_map import LiveMap, MapUpdate
 from bentwing.live.prediction import StampedPose, past_pose
@@ -24,7 +25,6 @@ from bentwing.recording import ImuBatch, LidarBatch, Payload
 
 if TYPE_CHECKING:
     from pathlib import Path
-    from types import TracebackType
 
     from numpy.typing import ArrayLike, NDArray
     from typing_extensions import Self
@@ -50,14 +50,7 @@ class Odometry:
     threads : for one registration; default: all cores
     map_spacing : m, edge of the voxels that keep one point of the map each
     max_map_points : the map never holds more, at 20 bytes each: `map_spacing` doubles instead
-    max_lag : s that points may wait for their registration; what comes then is dropped and counted
-
-    Examples
-    --------
-    >>> with Odometry("payload.yaml") as odometry:  # doctest: +SKIP
-    ...     odometry.add_imu(time, gyro, accel)
-    ...     odometry.add_points(points, times)
-    ...     pose = odometry.pose()
+    max_lag : s that registration may be late; points are thinned out before, and counted
     """
 
     def __init__(
@@ -78,7 +71,7 @@ class Odometry:
             raise UsageError(msg)
         head = payload if isinstance(payload, Payload) else Payload.load(payload)
         self._payload = head
-        self._max_lag = max_lag
+        self._backlog = Backlog(max_lag)
         self._dropped: Counter[str] = Counter({"live.points_dropped": 0})
         self._filtered: Counter[str] = Counter()
         self._order = InputOrder()
@@ -283,18 +276,13 @@ class Odometry:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def _take(self, batch: Batch) -> None:
         if not len(batch.times):
             return
-        if isinstance(batch, LidarBatch) and self._too_late(batch):
+        if isinstance(batch, LidarBatch) and not self._has_time(batch):
             self._dropped["live.points_dropped"] += len(batch.times)
         else:
             self._worker.put(batch)
@@ -304,7 +292,8 @@ class Odometry:
         elif isinstance(batch, LidarBatch):
             self._newest_point = float(batch.times[-1])
 
-    def _too_late(self, batch: LidarBatch) -> bool:
+    def _has_time(self, batch: LidarBatch) -> bool:
         self._worker.require_health()
-        newest = self._state.newest
-        return newest is not None and float(batch.times[-1]) - newest.done.end > self._max_lag
+        newest, end = self._state.newest, float(batch.times[-1])
+        shift = self._engine.settings.shift
+        return newest is None or self._backlog.has_time(end, newest.done.end, shift)

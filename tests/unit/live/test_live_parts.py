@@ -10,6 +10,7 @@ import pytest
 
 from bentwing import _core, geometry
 from bentwing.estimators.odometry_pass import DT
+from bentwing.live.backlog import Backlog
 from bentwing.live.imu_tail import ImuTail
 from bentwing.live.live_map import LiveMap
 from bentwing.live.prediction import Prediction
@@ -137,3 +138,43 @@ def test_updates_of_a_map_join_to_the_map():
         cloud._keep(rng.uniform(0.0, 2.0, (300, 3)))
         parts.append(cloud.update().points)
     assert np.array_equal(np.concatenate(parts), cloud.points())
+
+
+def taken(cost):
+    """Shares of the scans that are taken, and lags, when a window needs `cost` s with all its scans."""
+    backlog, registered, busy_until, window = Backlog(10.0), 0.0, 0.0, []
+    share, lags = [], []
+    for now in np.arange(0.0, 200.0, 0.025):
+        take = backlog.has_time(now, registered, 1.0)
+        share.append(take)
+        window += [now] * take
+        if now >= busy_until and window and window[-1] >= registered + 1.0:
+            registered += 1.0
+            used = [t for t in window if t < registered]
+            window = [t for t in window if t >= registered]
+            busy_until = now + cost * (0.3 + 0.7 * len(used) / 40)
+        lags.append(now - registered)
+    return np.mean(share[4000:]), np.array(lags[4000:])
+
+
+def test_all_scans_are_taken_while_there_is_time():
+    share, lags = taken(cost=0.9)
+    assert share == 1.0
+    assert lags.max() < 3.0
+
+
+def test_scans_are_thinned_evenly_where_windows_take_too_long():
+    """A window of 1.5 s is down to 1 s with half of its scans: 0.3 + 0.7 · 0.52 of it.
+
+    What is left out shows in the lag two windows later.
+    """
+    share, lags = taken(cost=1.5)
+    assert share == pytest.approx(0.52, abs=0.05)
+    assert lags.max() < 10.0 + 2.0
+
+
+def test_a_window_that_always_takes_too_long_gets_some_scan():
+    """What is too slow for any scan falls behind, but never stands still."""
+    share, lags = taken(cost=4.0)
+    assert share > 0.0
+    assert lags[-1] < 110.0

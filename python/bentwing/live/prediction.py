@@ -102,9 +102,9 @@ class Prediction:
         )
 
     def _carried_to(self, at: float, imu: ImuTail) -> _core.Samples:
-        if not len(imu):
-            return self._carried.extended(None, self._slow, at + DT)[0]
         batch = imu.since(self._carried.end - OVERLAP)
+        if not len(batch.times):
+            return self._carried.extended(None, self._slow, at + DT)[0]
         times, gyro, accel = batch.times, batch.gyro, batch.accel
         if imu.end > self._carried.end + DT:
             real = _core.Imu(times, gyro, accel)

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
         SingularSystemError,
         UsageError,
     )
+    from bentwing.live import Odometry
     from bentwing.pipeline import map_recording
     from bentwing.recording import Payload, Recording
     from bentwing.registration import WindowResult, register_window
@@ -32,6 +33,7 @@ __all__ = [
     "EstimationError",
     "InputError",
     "NotEnoughDataError",
+    "Odometry",
     "Payload",
     "PayloadError",
     "Recording",
@@ -48,6 +50,7 @@ __all__ = [
 
 # Where the names live; imported when first asked for, so that `import bentwing` costs nothing.
 _HOMES = {
+    "Odometry": "live",
     "map_recording": "pipeline",
     "Payload": "recording",
     "Recording": "recording",

@@ -3,12 +3,13 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bentwing import _core, geometry
-from bentwing.errors import NotEnoughDataError
+from bentwing.errors import EstimationError, NotEnoughDataError
 from bentwing.estimators.buffer import BatchBuffer
 from bentwing.estimators.core_settings import CoreSettings
 from bentwing.estimators.core_states import core_globals, refined_mount
@@ -17,16 +18,24 @@ from bentwing.estimators.mount import described_mount
 from bentwing.estimators.odometry_pass import DT, MARGIN, OdometryPass
 from bentwing.estimators.settings import ContinuousSettings
 from bentwing.estimators.slow_states import SlowStatePrior, named_std
-from bentwing.estimators.start import STANDARD_GRAVITY, Start, attitude_of, find_start, level_start
+from bentwing.estimators.start import (
+    STANDARD_GRAVITY,
+    Start,
+    attitude_of,
+    find_start,
+    level_start,
+    levelling,
+)
 from bentwing.trajectory import Trajectory
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from bentwing.recording import Batch, Payload
 
 # A rest shorter than this is waited out before the start is judged, s.
 LOOK_AHEAD = 6.0
+# Where data comes faster than it is registered, the repetition is given up this many rehearsals
+# after the start: what was learned is used all the same, and the buffer must not grow.
+LATEST_REPETITION = 4.0
 # A start in motion is rehearsed over these stretches first, s: velocity, then attitude.
 MOVING_REHEARSALS = (2.0, 5.0)
 
@@ -55,12 +64,39 @@ class Continuous:
         self._start: Start | None = None
         self._first = 0.0
         self._pass: OdometryPass | None = None
+        # A rehearsed pass, until the pass that repeats it has caught up.
+        self._ahead: OdometryPass | None = None
         self._rehearsals: tuple[float, ...] = ()
+        self._notes: list[str] = []
 
     def feed(self, batch: Batch) -> None:
         """Take the next batch; windows that have become complete are registered."""
-        self._buffer.add(batch)
+        self.take(batch)
         self._advance(finishing=False)
+
+    def take(self, batch: Batch) -> None:
+        """Hold the next batch for `step`."""
+        self._buffer.add(batch)
+
+    def step(self, *, finishing: bool = False) -> OdometryPass | None:
+        """Register one window that has become complete; returns its pass, None without any.
+
+        While a rehearsal is repeated, the rehearsed pass goes on first, so that the newest pose
+        never becomes old. The result is that of `feed`; `finishing` as `result` does.
+        """
+        ready = self._ready_until(finishing=finishing)
+        if ready is None or (self._start is None and not self._begin(ready, finishing=finishing)):
+            return None
+        ahead, shift = self._ahead, self._sliding.shift
+        if ahead is not None and ahead.end + shift <= ready:
+            try:
+                ahead.step(self._buffer, ahead.end + shift)
+            except EstimationError:  # what counts is the pass that follows
+                self._ahead = None
+            else:
+                self._give_up_repeating(ahead)
+                return ahead
+        return self._pass if self._step(ready, finishing=finishing) else None
 
     def result(self) -> Estimate:
         """Finish with what was fed so far.
@@ -85,7 +121,22 @@ class Continuous:
         if done is None or not done.windows or done.end - self._first < self._sliding.shift:
             msg = f"less than {self._sliding.shift:g} s of lidar points; nothing can be estimated"
             raise NotEnoughDataError(msg)
-        return self._estimate(done)
+        return self.estimate(done)
+
+    @property
+    def passes(self) -> list[OdometryPass]:
+        """The passes that are under way, the newest pose first."""
+        return [p for p in (self._ahead, self._pass) if p is not None]
+
+    @property
+    def rehearsing(self) -> bool:
+        """Whether the first seconds are still to be repeated, or being repeated."""
+        return bool(self._rehearsals) or self._ahead is not None
+
+    @property
+    def buffer(self) -> BatchBuffer:
+        """What coming windows may need of the batches."""
+        return self._buffer
 
     def _advance(self, *, finishing: bool) -> None:
         ready = self._ready_until(finishing=finishing)
@@ -134,7 +185,7 @@ class Continuous:
         keep = learned is not None and not self._rehearsals
         slow = learned.globals.levelled() if learned and keep else self._initial_globals(start)
         if learned is not None and keep and start.static is not None:
-            prior = learned.prior
+            prior = deepcopy(learned.prior)  # the rehearsed pass may go on
             prior.recentre("gravity")
         else:
             prior = self._initial_prior(start)
@@ -180,7 +231,7 @@ class Continuous:
         """Return the rest at the start, or the first two poses of a start in motion."""
         if start.static is None and learned is not None:
             _, positions, quats = learned.trajectory()
-            level = _levelling(learned.globals.gravity)
+            level = levelling(learned.globals.gravity)
             positions = geometry.rotate(level, positions[:2] - positions[0])
             quats = geometry.multiply(np.stack([level, level]), quats[:2])
             return _core.Samples(self._first, DT, positions, quats)
@@ -199,6 +250,7 @@ class Continuous:
             rehearsed = current.end - start.hold >= self._rehearsals[0]
             if rehearsed or (finishing and ready - current.end < DT):
                 self._rehearsals = self._rehearsals[1:]
+                self._ahead = self._ahead or current
                 self._pass = current = self._new_pass(start, current)
         end = current.end + self._sliding.shift
         if end > ready:
@@ -206,13 +258,26 @@ class Continuous:
                 return False
             end = ready
         current.step(self._buffer, end)
+        if self._ahead is not None and current.end >= self._ahead.end:
+            self._ahead = None
         if not self._rehearsals:
             self._buffer.forget(end - self._sliding.window - 1.0)
         return True
 
-    def _estimate(self, last: OdometryPass) -> Estimate:
+    def _give_up_repeating(self, ahead: OdometryPass) -> None:
+        longest = LATEST_REPETITION * self.settings.rehearsal
+        if self._start is None or ahead.end - self._start.hold < longest:
+            return
+        self._pass, self._ahead, self._rehearsals = ahead, None, ()
+        self._notes.append(
+            f"the first {self.settings.rehearsal:g} s could not be repeated within {longest:g} s: "
+            "windows take too long here; give fewer points or a larger shift"
+        )
+
+    def estimate(self, last: OdometryPass) -> Estimate:
+        """Return what a pass says, levelled."""
         times, positions, quats = last.trajectory()
-        level = _levelling(last.globals.gravity)
+        level = levelling(last.globals.gravity)
         trajectory = Trajectory(
             times,
             geometry.rotate(level, positions),
@@ -236,18 +301,8 @@ class Continuous:
                 "estimate.samples_without_imu": last.n_blind,
             },
             timings=last.timings,
-            warnings=_warnings(last),
+            warnings=_warnings(last) + self._notes,
         )
-
-
-def _levelling(gravity: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Quaternion (4,) that turns the direction of `gravity` (3,) to +z the shortest way."""
-    up = gravity / np.linalg.norm(gravity)
-    axis = np.cross(up, [0.0, 0.0, 1.0])
-    sine = float(np.linalg.norm(axis))
-    if sine < 1e-12:
-        return np.array([0.0, 0.0, 0.0, 1.0])
-    return geometry.exp((axis / sine * np.arctan2(sine, up[2]))[None]).reshape(4)
 
 
 def _warnings(last: OdometryPass) -> list[str]:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import time
+from copy import copy
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -100,6 +101,13 @@ class OdometryPass:
         positions = np.concatenate([p for p, _ in parts])
         times = self._origin + DT * np.arange(len(positions), dtype=np.float64)
         return times, positions, np.concatenate([q for _, q in parts])
+
+    def snapshot(self) -> OdometryPass:
+        """Return the state as it is now, to be read while the pass goes on in another thread."""
+        frozen = copy(self)
+        frozen.windows = [*self.windows]
+        frozen._finished = [*self._finished]
+        return frozen
 
     def _imu(self, buffer: BatchBuffer, end: float) -> _core.Imu | None:
         if not buffer.has_imu:

@@ -74,3 +74,13 @@ def find_start(imu: ImuBatch, noise: Imu) -> Start:
 def attitude_of(force: NDArray[np.float64]) -> NDArray[np.float64]:
     """Quaternion (4,) of the attitude, yaw zero, in which `force` (3,) in the IMU frame is up."""
     return geometry.from_matrices(level_attitude(force)[None]).reshape(4)
+
+
+def levelling(gravity: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Quaternion (4,) that turns the direction of `gravity` (3,) to +z the shortest way."""
+    up = gravity / np.linalg.norm(gravity)
+    axis = np.cross(up, [0.0, 0.0, 1.0])
+    sine = float(np.linalg.norm(axis))
+    if sine < 1e-12:
+        return np.array([0.0, 0.0, 0.0, 1.0])
+    return geometry.exp((axis / sine * np.arctan2(sine, up[2]))[None]).reshape(4)

@@ -34,19 +34,40 @@ def preprocess(batches: Iterable[Batch], payload: Payload, counts: Counter[str])
         IMU and encoder batches as they came; lidar batches without the dropped points, with an
         encoder as soon as its angles reach beyond them.
     """
-    encoder = None if payload.encoder is None else EncoderAngles(counts)
+    chain = Preprocessing(payload, counts)
     for batch in batches:
+        yield from chain.add(batch)
+    yield from chain.finish()
+
+
+class Preprocessing:
+    """The same, batch by batch as they come.
+
+    Parameters
+    ----------
+    payload, counts : as of `preprocess`
+    """
+
+    def __init__(self, payload: Payload, counts: Counter[str]) -> None:
+        self._payload = payload
+        self._counts = counts
+        self._encoder = None if payload.encoder is None else EncoderAngles(counts)
+
+    def add(self, batch: Batch) -> Iterator[Batch]:
+        """Take the next batch; yield what has become usable."""
         if isinstance(batch, LidarBatch):
-            kept = _filtered(batch, payload, counts)
-            if len(kept.times) == 0:
-                continue
-            yield from [kept] if encoder is None else encoder.add_lidar(kept)
-            continue
+            kept = _filtered(batch, self._payload, self._counts)
+            if len(kept.times):
+                yield from [kept] if self._encoder is None else self._encoder.add_lidar(kept)
+            return
         yield batch
-        if isinstance(batch, EncoderBatch) and encoder is not None:
-            yield from encoder.add_encoder(batch)
-    if encoder is not None:
-        yield from encoder.finish()
+        if isinstance(batch, EncoderBatch) and self._encoder is not None:
+            yield from self._encoder.add_encoder(batch)
+
+    def finish(self) -> Iterator[Batch]:
+        """Yield what still waits for the encoder, as far as it is covered."""
+        if self._encoder is not None:
+            yield from self._encoder.finish()
 
 
 def _filtered(batch: LidarBatch, payload: Payload, counts: Counter[str]) -> LidarBatch:

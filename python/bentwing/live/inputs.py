@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""What a live user hands over, checked before anything is changed by it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bentwing.recording.batches import EncoderBatch, ImuBatch, LidarBatch
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    from bentwing.recording.batches import Batch
+
+# Float64 cannot hold the seconds of an epoch to better than 0.24 µs; nobody maps for three years.
+_LONGEST = 1e8
+
+
+class InputOrder:
+    """Makes batches of arrays, refusing what goes back in time within one sensor."""
+
+    def __init__(self) -> None:
+        self._newest: dict[type[Batch], float] = {}
+
+    def imu(self, times: ArrayLike, gyro: ArrayLike, accel: ArrayLike) -> ImuBatch:
+        """Return inertial samples, one or many."""
+        stamps = self._times("IMU", ImuBatch, times)
+        return ImuBatch(
+            stamps,
+            _table("IMU", "gyro", gyro, stamps),
+            _table("IMU", "accel", accel, stamps),
+        )
+
+    def points(self, points: ArrayLike, times: ArrayLike) -> LidarBatch:
+        """Return returns of the lidar."""
+        stamps = self._times("point", LidarBatch, times)
+        return LidarBatch(_table("point", "points", points, stamps), stamps)
+
+    def encoder(self, times: ArrayLike, angles: ArrayLike) -> EncoderBatch:
+        """Return angles of the motor, one or many."""
+        stamps = self._times("encoder", EncoderBatch, times)
+        values = np.array(angles, dtype=np.float64, ndmin=1)
+        if values.shape != stamps.shape:
+            msg = f"{_named('encoder', stamps)}: angles: expected shape {stamps.shape}, got {values.shape}"
+            raise ValueError(msg)
+        _require_finite("encoder", "angles", values, stamps)
+        return EncoderBatch(stamps, values)
+
+    def accept(self, batch: Batch) -> None:
+        """Remember a batch that was taken."""
+        self._newest[type(batch)] = float(batch.times[-1])
+
+    def _times(self, sensor: str, kind: type[Batch], times: ArrayLike) -> NDArray[np.float64]:
+        # A copy: drivers fill the same buffer again.
+        stamps = np.array(times, dtype=np.float64, ndmin=1)
+        if stamps.ndim != 1:
+            msg = f"{sensor} batch: times: expected shape (N,), got {stamps.shape}"
+            raise ValueError(msg)
+        if not len(stamps):
+            return stamps
+        _require_finite(sensor, "times", stamps, stamps)
+        if abs(stamps).max() > _LONGEST:
+            msg = (
+                f"{_named(sensor, stamps)}: times: expected seconds since a start of your choice; "
+                "subtract it from the stamps while they are integer nanoseconds"
+            )
+            raise ValueError(msg)
+        steps = np.diff(stamps)
+        if np.any(steps < 0):
+            row = int(np.argmax(steps < 0)) + 1
+            msg = f"{_named(sensor, stamps)}: times: row {row} goes back by {-steps[row - 1]:.6f} s; sort by time"
+            raise ValueError(msg)
+        newest = self._newest.get(kind, -np.inf)
+        if stamps[0] < newest:
+            msg = (
+                f"{_named(sensor, stamps)}: times: begins before {newest:.6f} s, the end of the "
+                "batch before; feed each sensor in the order of its time"
+            )
+            raise ValueError(msg)
+        return stamps
+
+
+def _table(
+    sensor: str, name: str, values: ArrayLike, stamps: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    table = np.array(values, dtype=np.float64, order="C", ndmin=2)
+    expected = (len(stamps), 3)
+    if table.shape != expected and not (table.size == 0 and not len(stamps)):
+        msg = f"{_named(sensor, stamps)}: {name}: expected shape {expected}, got {np.shape(values)}"
+        raise ValueError(msg)
+    _require_finite(sensor, name, table, stamps)
+    return table.reshape(expected)
+
+
+def _require_finite(
+    sensor: str, name: str, values: NDArray[np.float64], stamps: NDArray[np.float64]
+) -> None:
+    finite = np.isfinite(values)
+    if finite.all():
+        return
+    rows = finite if finite.ndim == 1 else finite.all(axis=1)
+    row = int(np.argmin(rows))
+    hint = "; leave out the directions without a return" if name == "points" else ""
+    msg = f"{_named(sensor, stamps)}: {name}: row {row} is not finite: {values[row]}{hint}"
+    raise ValueError(msg)
+
+
+def _named(sensor: str, stamps: NDArray[np.float64]) -> str:
+    return f"{sensor} batch at {stamps[0]:.6f} s" if len(stamps) else f"{sensor} batch"

@@ -118,8 +118,8 @@ def _estimate(
         folder.record["warnings"] += part.recording.warnings
         if run.estimate is not None:
             folder.add_estimate(run.estimate)
-            folder.write_trajectory("odometry.txt", run.estimate.trajectory, origin_ns)
-    folder.write_trajectory("trajectory.txt", run.estimate.trajectory, origin_ns)
+            folder.write_trajectory("odometry.txt", run.estimate, origin_ns)
+    folder.write_trajectory("trajectory.txt", run.estimate, origin_ns)
 
 
 def _write_map(
@@ -132,6 +132,7 @@ def _write_map(
         part.batches(shown, Counter()),  # what is dropped was counted in the first pass
         run.estimate.trajectory,
         run.estimate.calibration,
+        segments=run.estimate.segments,
         threads=asked["threads"],
         counts=counts,
     )

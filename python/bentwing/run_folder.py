@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from typing_extensions import Self
 
     from bentwing.estimators.interface import Estimate
-    from bentwing.trajectory import Trajectory
 
 RECORD = "run.json"
 _KIND = "bentwing run"
@@ -65,6 +64,7 @@ class RunFolder:
             "timings": {},
             "warnings": [],
             "calibration": None,
+            "segments": [],
             "windows": [],
             "peak_memory_mb": None,
         }
@@ -122,6 +122,7 @@ class RunFolder:
             w for w in estimate.warnings if w not in self.record["warnings"]
         ]
         self.record["calibration"] = plain(estimate.calibration)
+        self.record["segments"] = plain(estimate.segments)
         self.record["windows"] = plain(estimate.windows)
 
     def file(self, name: str) -> Path:
@@ -130,9 +131,10 @@ class RunFolder:
             self.record["files"].append(name)
         return self.path / name
 
-    def write_trajectory(self, name: str, trajectory: Trajectory, clock_origin_ns: int) -> None:
-        """Write trajectory.txt or odometry.txt."""
-        trajectory.write_tum(self.file(name), clock_origin_ns)
+    def write_trajectory(self, name: str, estimate: Estimate, clock_origin_ns: int) -> None:
+        """Write trajectory.txt or odometry.txt, without the guesses between segments."""
+        poses = estimate.trajectory.within(estimate.segments)
+        poses.write_tum(self.file(name), clock_origin_ns)
 
     def save(self) -> None:
         """Write run.json as it stands."""

@@ -16,6 +16,8 @@ from bentwing.clock import NS_PER_S, Clock
 from bentwing.errors import InputError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
 _TUM_COLUMNS = 8
@@ -83,6 +85,13 @@ class Trajectory:
         p = self.positions
         positions = p[i] + shares[:, None] * (p[i + 1] - p[i])
         return positions, geometry.slerp(self.quats_xyzw[i], self.quats_xyzw[i + 1], shares)
+
+    def within(self, spans: Sequence[tuple[float, float]]) -> Trajectory:
+        """Return the poses with first <= time <= last of any span, s; all of them without spans."""
+        if not spans:
+            return self
+        keep = np.any([(self.times >= a) & (self.times <= b) for a, b in spans], axis=0)
+        return Trajectory(self.times[keep], self.positions[keep], self.quats_xyzw[keep])
 
     def write_tum(self, path: Path, clock_origin_ns: int) -> None:
         """Write `t x y z qx qy qz qw` with absolute stamps that are exact to the nanosecond.

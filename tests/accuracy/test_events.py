@@ -47,7 +47,8 @@ def test_a_gap_is_told_with_its_length_and_place(flown):
     text = sentences(fly(flown, "gap"))
     for topic in ("/scan", "/imu"):
         assert f"{topic}: 1 gap(s): 1.5 s from" in text
-    assert "have no inertial data" in text
+    assert "no inertial data from 13.2" in text
+    assert "fits together" in text
 
 
 def test_a_start_in_motion_still_gives_a_map(flown):

@@ -38,7 +38,7 @@ def test_a_run_that_ends_well_is_complete_and_names_its_files(tmp_path):
         assert record_of(out)["complete"] is False
         with run.stage("estimate"):
             run.add_estimate(estimate())
-        run.write_trajectory("trajectory.txt", estimate().trajectory, 0)
+        run.write_trajectory("trajectory.txt", estimate(), 0)
     record = record_of(out)
     assert (record["complete"], record["stage"], record["reason"]) == (True, "done", None)
     assert record["files"] == ["trajectory.txt"]
@@ -62,7 +62,7 @@ def test_a_run_that_ends_well_is_complete_and_names_its_files(tmp_path):
 def test_a_run_that_stops_keeps_what_it_has_and_says_where_and_why(tmp_path, error, reason):
     def stopping():
         with RunFolder(tmp_path) as run:
-            run.write_trajectory("odometry.txt", estimate().trajectory, 0)
+            run.write_trajectory("odometry.txt", estimate(), 0)
             with run.stage("map"):
                 run.file("map.laz")
                 raise error

@@ -16,6 +16,14 @@ def screw(n=200, rate=4.0):
     return Trajectory(times, np.outer(times, [1.0, 2.0, 0.5]), geometry.exp(turns))
 
 
+def test_the_poses_within_spans_are_kept():
+    times = 0.1 * np.arange(11)
+    whole = Trajectory(times, np.zeros((11, 3)), np.tile([0.0, 0.0, 0.0, 1.0], (11, 1)))
+    part = whole.within([(0.0, 0.25), (0.75, 2.0)])
+    assert part.times == pytest.approx([0.0, 0.1, 0.2, 0.8, 0.9, 1.0])
+    assert whole.within([]) is whole
+
+
 def test_interpolation_is_exact_for_a_steady_screw_motion():
     times = np.random.default_rng(0).uniform(0, 1.99, 500)
     positions, quats = screw().interpolate(times)

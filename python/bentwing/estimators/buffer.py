@@ -8,6 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bentwing.estimators.segments import (
+    MAX_IMU_GAP,
+    MAX_LIDAR_GAP,
+    MAX_LIDAR_GAP_WITHOUT_IMU,
+    Break,
+)
 from bentwing.recording.batches import EncoderBatch, ImuBatch, LidarBatch
 
 if TYPE_CHECKING:
@@ -33,6 +39,7 @@ class BatchBuffer:
     def __init__(self) -> None:
         self._lidar: list[LidarBatch] = []
         self._imu: list[ImuBatch] = []
+        self._breaks: list[Break] = []
 
     def add(self, batch: Batch) -> None:
         """Take the next batch; encoder batches have done their work in preprocess."""
@@ -41,10 +48,13 @@ class BatchBuffer:
         if isinstance(batch, LidarBatch):
             _require_usable(batch.times, points=batch.points)
             _require_order(self._lidar, batch)
+            longest = MAX_LIDAR_GAP if self._imu else MAX_LIDAR_GAP_WITHOUT_IMU
+            self._breaks += _breaks("lidar", self._lidar, batch, longest)
             self._lidar.append(batch)
         else:
             _require_usable(batch.times, gyro=batch.gyro, accel=batch.accel)
             _require_order(self._imu, batch)
+            self._breaks += _breaks("inertial", self._imu, batch, MAX_IMU_GAP)
             self._imu.append(batch)
 
     @property
@@ -89,10 +99,35 @@ class BatchBuffer:
         accel = np.concatenate([b.accel for b in parts])[keep]
         return ImuBatch(times[keep], np.ascontiguousarray(gyro), np.ascontiguousarray(accel))
 
+    def first_break(self) -> Break | None:
+        """Return the earliest silence that is too long."""
+        return min(self._breaks, key=lambda b: b.start, default=None)
+
+    def pass_over(self, silence: Break) -> None:
+        """Forget a silence, but not the samples around it."""
+        self._breaks.remove(silence)
+
+    def cut(self, before: float) -> None:
+        """Drop all samples before a time, s, and the breaks that end by then."""
+        self._breaks = [b for b in self._breaks if b.stop > before]
+        self._lidar = [b.where(b.times >= before) for b in self._lidar if b.times[-1] >= before]
+        self._imu = [b.where(b.times >= before) for b in self._imu if b.times[-1] >= before]
+
     def forget(self, before: float) -> None:
         """Drop batches that end before a time, s."""
         self._lidar = [b for b in self._lidar if b.times[-1] >= before]
         self._imu = [b for b in self._imu if b.times[-1] >= before]
+
+
+def _breaks(
+    sensor: str, held: Sequence[LidarBatch | ImuBatch], batch: LidarBatch | ImuBatch, longest: float
+) -> list[Break]:
+    before = held[-1].times[-1:] if held else batch.times[:1]
+    times = np.concatenate([before, batch.times])
+    return [
+        Break(sensor, float(times[i]), float(times[i + 1]))
+        for i in np.flatnonzero(np.diff(times) > longest)
+    ]
 
 
 def _require_usable(times: NDArray[np.float64], **fields: NDArray[np.float64]) -> None:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from copy import deepcopy
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,8 +16,17 @@ from bentwing.estimators.core_states import core_globals, refined_mount
 from bentwing.estimators.interface import Calibration, Estimate
 from bentwing.estimators.mount import described_mount
 from bentwing.estimators.odometry_pass import DT, MARGIN, OdometryPass
+from bentwing.estimators.segments import (
+    JUDGED,
+    MAX_IMU_GAP,
+    Break,
+    Segment,
+    found_again,
+    heading,
+    joined,
+)
 from bentwing.estimators.settings import ContinuousSettings
-from bentwing.estimators.slow_states import SlowStatePrior, named_std
+from bentwing.estimators.slow_states import SlowStatePrior, initial_std, named_std
 from bentwing.estimators.start import (
     STANDARD_GRAVITY,
     Start,
@@ -26,7 +35,6 @@ from bentwing.estimators.start import (
     level_start,
     levelling,
 )
-from bentwing.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from bentwing.recording import Batch, Payload
@@ -67,6 +75,10 @@ class Continuous:
         # A rehearsed pass, until the pass that repeats it has caught up.
         self._ahead: OdometryPass | None = None
         self._rehearsals: tuple[float, ...] = ()
+        # What came before the last break.
+        self._before: list[OdometryPass] = []
+        # The pass as it was at a break, while it is not known whether it can be continued.
+        self._bridged: tuple[OdometryPass, Break] | None = None
         self._notes: list[str] = []
 
     def feed(self, batch: Batch) -> None:
@@ -107,6 +119,12 @@ class Continuous:
             There is no second of lidar data.
         """
         self._advance(finishing=True)
+        lidar, imu = self._buffer.lidar_span, self._buffer.imu_span
+        if lidar is not None and imu is not None and lidar[1] > imu[1] + MAX_IMU_GAP:
+            self._notes.append(
+                f"the inertial data end at {imu[1]:.2f} s, {lidar[1] - imu[1]:.1f} s before the "
+                "lidar's: what the lidar saw after that is left out"
+            )
         return self.so_far()
 
     def so_far(self) -> Estimate:
@@ -119,8 +137,12 @@ class Continuous:
         """
         done = self._pass
         if done is None or not done.windows or done.end - self._first < self._sliding.shift:
-            msg = f"less than {self._sliding.shift:g} s of lidar points; nothing can be estimated"
-            raise NotEnoughDataError(msg)
+            if not self._before:
+                msg = (
+                    f"less than {self._sliding.shift:g} s of lidar points; nothing can be estimated"
+                )
+                raise NotEnoughDataError(msg)
+            return self._estimate(self._before)
         return self.estimate(done)
 
     @property
@@ -139,13 +161,11 @@ class Continuous:
         return self._buffer
 
     def _advance(self, *, finishing: bool) -> None:
-        ready = self._ready_until(finishing=finishing)
-        if ready is None:
-            return
-        if self._start is None and not self._begin(ready, finishing=finishing):
-            return
-        while self._step(ready, finishing=finishing):
-            pass
+        while (ready := self._ready_until(finishing=finishing)) is not None:
+            if self._start is None and not self._begin(ready, finishing=finishing):
+                return
+            if not self._step(ready, finishing=finishing):
+                return
 
     def _ready_until(self, *, finishing: bool) -> float | None:
         """Return the time up to which lidar and IMU data are complete, s."""
@@ -154,7 +174,7 @@ class Continuous:
             return None
         if imu is None:
             return lidar[1]
-        return lidar[1] if finishing else min(lidar[1], imu[1] - 2 * MARGIN)
+        return min(lidar[1], imu[1] + MAX_IMU_GAP if finishing else imu[1] - 2 * MARGIN)
 
     def _begin(self, ready: float, *, finishing: bool) -> bool:
         """Find the start once enough has been seen; returns whether it was."""
@@ -203,6 +223,8 @@ class Continuous:
         return begun
 
     def _initial_globals(self, start: Start) -> _core.Globals:
+        if self._before:
+            return self._before[-1].globals.levelled()
         return core_globals(
             Calibration(
                 latency=0.0,
@@ -214,15 +236,20 @@ class Continuous:
         )
 
     def _initial_prior(self, start: Start) -> SlowStatePrior:
+        moving = start.static is None
+        if self._before:
+            inherited = deepcopy(self._before[-1].prior)
+            inherited.reset("gravity", initial_std(moving=moving)["gravity"])
+            return inherited
         has_imu = self._buffer.has_imu and self._payload.imu is not None
         prior = SlowStatePrior(
             self._payload.imu if has_imu else None,
             has_motor=self._payload.encoder is not None,
-            moving=start.static is None,
+            moving=moving,
             frozen=self.settings.frozen,
         )
         if start.static is not None:
-            prior.tighten("gyro_bias", start.static.gyro_bias_std)
+            prior.reset("gyro_bias", start.static.gyro_bias_std)
         return prior
 
     def _first_samples(
@@ -234,18 +261,26 @@ class Continuous:
             level = levelling(learned.globals.gravity)
             positions = geometry.rotate(level, positions[:2] - positions[0])
             quats = geometry.multiply(np.stack([level, level]), quats[:2])
-            return _core.Samples(self._first, DT, positions, quats)
-        n = max(2, int((start.hold - self._first) / DT) + 1)
-        quat = start.quat_xyzw
-        if start.static is not None:
-            quat = attitude_of(start.static.accel_mean - slow.accel_bias)
-        return _core.Samples(self._first, DT, np.zeros((n, 3)), np.repeat(quat[None], n, axis=0))
+        else:
+            n = max(2, int((start.hold - self._first) / DT) + 1)
+            quat = start.quat_xyzw
+            if start.static is not None:
+                quat = attitude_of(start.static.accel_mean - slow.accel_bias)
+            positions, quats = np.zeros((n, 3)), np.repeat(quat[None], n, axis=0)
+        if self._before:
+            at, quat = self._segments(self._before)[-1].extrapolated(self._first)
+            turn = heading(geometry.multiply(quat, geometry.inverse(quats[0])))
+            positions = at + geometry.rotate(turn, positions)
+            quats = geometry.multiply(np.broadcast_to(turn, quats.shape), quats)
+        return _core.Samples(self._first, DT, positions, quats)
 
     def _step(self, ready: float, *, finishing: bool) -> bool:
         """Register the next window if its data is complete; returns whether it was."""
-        current, start = self._pass, self._start
+        current, start, broken = self._pass, self._start, self._break_until(ready)
         if current is None or start is None:
             return False
+        if broken is not None:
+            ready, finishing = broken.start, True
         if self._rehearsals:
             rehearsed = current.end - start.hold >= self._rehearsals[0]
             if rehearsed or (finishing and ready - current.end < DT):
@@ -254,14 +289,51 @@ class Continuous:
                 self._pass = current = self._new_pass(start, current)
         end = current.end + self._sliding.shift
         if end > ready:
-            if not finishing or ready - current.end < DT:
+            if not finishing:
                 return False
+            if ready - current.end < DT:
+                return self._judge_bridge() or self._bridge(current, broken)
             end = ready
         current.step(self._buffer, end)
         if self._ahead is not None and current.end >= self._ahead.end:
             self._ahead = None
-        if not self._rehearsals:
-            self._buffer.forget(end - self._sliding.window - 1.0)
+        self._settle(end)
+        return True
+
+    def _settle(self, end: float) -> None:
+        """Judge a bridge when enough was seen behind it, and forget what no window needs."""
+        if self._bridged is not None and end >= self._bridged[1].stop + JUDGED[1]:
+            self._judge_bridge()
+        elif not self._rehearsals:
+            needed = end if self._bridged is None else self._bridged[1].start
+            self._buffer.forget(needed - self._sliding.window - 1.0)
+
+    def _break_until(self, ready: float) -> Break | None:
+        broken = self._buffer.first_break()
+        return broken if broken is not None and broken.start <= ready else None
+
+    def _bridge(self, current: OdometryPass, broken: Break | None) -> bool:
+        """Go on over a break as if it were none; returns whether there is one."""
+        if broken is None:
+            return False
+        self._bridged = current.snapshot(), broken
+        self._buffer.pass_over(broken)
+        return True
+
+    def _judge_bridge(self) -> bool:
+        """Begin anew after the last break if its far side does not fit; returns whether so."""
+        if self._bridged is None or self._pass is None:
+            return False
+        (before, broken), self._bridged = self._bridged, None
+        found = found_again(self._pass.windows, broken)
+        self._notes.append(broken.sentence(bridged=found))
+        if found:
+            return False
+        self._buffer.cut(broken.stop)
+        if before.windows:
+            self._before.append(before)
+        self._start = self._pass = self._ahead = None
+        self._rehearsals = ()
         return True
 
     def _give_up_repeating(self, ahead: OdometryPass) -> None:
@@ -275,14 +347,13 @@ class Continuous:
         )
 
     def estimate(self, last: OdometryPass) -> Estimate:
-        """Return what a pass says, levelled."""
-        times, positions, quats = last.trajectory()
-        level = levelling(last.globals.gravity)
-        trajectory = Trajectory(
-            times,
-            geometry.rotate(level, positions),
-            geometry.multiply(np.broadcast_to(level, quats.shape), quats),
-        )
+        """Return what the passes before the last break and this one say, levelled."""
+        return self._estimate([*self._before, last])
+
+    def _estimate(self, passes: list[OdometryPass]) -> Estimate:
+        segments, last = self._segments(passes), passes[-1]
+        windows = [w for p in passes for w in p.windows]
+        n_blind = sum(p.n_blind for p in passes)
         slow = last.globals
         calibration = Calibration(
             latency=slow.latency,
@@ -293,29 +364,45 @@ class Continuous:
             std=named_std(last.covariance, last.prior.frozen),
         )
         return Estimate(
-            trajectory,
+            joined(segments, DT),
             calibration,
-            windows=last.windows,
+            segments=[s.span for s in segments],
+            windows=windows,
             counts={
-                "estimate.windows": len(last.windows),
-                "estimate.samples_without_imu": last.n_blind,
+                "estimate.windows": len(windows),
+                "estimate.samples_without_imu": n_blind,
             },
-            timings=last.timings,
-            warnings=_warnings(last) + self._notes,
+            timings={name: sum(p.timings[name] for p in passes) for name in last.timings},
+            warnings=_warnings(windows, n_blind) + self._notes,
         )
 
+    def _segments(self, passes: list[OdometryPass]) -> list[Segment]:
+        """Return the trajectories of passes, each levelled about its first position."""
+        segments = []
+        for done in passes:
+            times, positions, quats = done.trajectory()
+            level = levelling(done.globals.gravity)
+            segments.append(
+                Segment(
+                    times,
+                    positions[0] + geometry.rotate(level, positions - positions[0]),
+                    geometry.multiply(np.broadcast_to(level, quats.shape), quats),
+                )
+            )
+        return segments
 
-def _warnings(last: OdometryPass) -> list[str]:
+
+def _warnings(windows: list[dict[str, Any]], n_blind: int) -> list[str]:
     sentences = []
-    degenerate = [w["time"] for w in last.windows if w["degenerate"]]
+    degenerate = [w["time"] for w in windows if w["degenerate"]]
     if degenerate:
         sentences.append(
-            f"{len(degenerate)} of {len(last.windows)} windows see too little in some direction "
+            f"{len(degenerate)} of {len(windows)} windows see too little in some direction "
             f"(first at {degenerate[0]:.1f} s): the IMU carries the estimate there"
         )
     # The trajectory is carried a little beyond the last stamps, always without data.
-    if last.n_blind * DT > 2 * MARGIN:
+    if n_blind * DT > 2 * MARGIN:
         sentences.append(
-            f"{last.n_blind * DT:.2f} s have no inertial data: the motion went on at constant velocity there"
+            f"{n_blind * DT:.2f} s have no inertial data: the motion went on at constant velocity there"
         )
     return sentences

@@ -54,6 +54,8 @@ class Estimate:
     counts : what was used and what was dropped
     timings : seconds of wall time by stage
     warnings : sentences about the health of the estimate
+    segments : first and last time of each stretch without a break, s; between them the trajectory
+        is a guess
     """
 
     trajectory: Trajectory
@@ -62,6 +64,7 @@ class Estimate:
     counts: dict[str, int] = field(default_factory=dict)
     timings: dict[str, float] = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)
+    segments: list[tuple[float, float]] = field(default_factory=list)
 
 
 class Estimator(Protocol):

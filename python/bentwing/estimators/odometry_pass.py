@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import time
-from copy import copy
+from copy import copy, deepcopy
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -103,9 +103,13 @@ class OdometryPass:
         return times, positions, np.concatenate([q for _, q in parts])
 
     def snapshot(self) -> OdometryPass:
-        """Return the state as it is now, to be read while the pass goes on in another thread."""
+        """Return the state as it is now, which stays so while the pass goes on."""
         frozen = copy(self)
         frozen.windows = [*self.windows]
+        frozen.prior = deepcopy(self.prior)
+        frozen.timings = dict(self.timings)
+        frozen._surfels = [*self._surfels]
+        frozen._views = copy(self._views)
         frozen._finished = [*self._finished]
         return frozen
 

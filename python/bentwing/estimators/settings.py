@@ -37,7 +37,7 @@ class RegistrationSettings(_Section):
     min_match_gap: float = Field(0.3, ge=0, description="least difference in time of matches, s")
     first_cauchy_scale: float = Field(3.0, gt=0, description="first outer iteration, sigmas")
     cauchy_scale: float = Field(1.0, gt=0, description="later outer iterations, sigmas")
-    max_outer: int = Field(5, ge=1)
+    max_outer: int = Field(20, ge=1, description="a window that follows a gap needs many")
     n_inner: int = Field(1, ge=1)
     min_translation: float = Field(1e-3, gt=0, description="smaller steps end the iterations, m")
     min_rotation: float = Field(1e-4, gt=0, description="smaller steps end the iterations, rad")

@@ -56,6 +56,11 @@ WALK = {
 MATCH_INDEPENDENCE = 0.1
 
 
+def initial_std(*, moving: bool) -> dict[str, float]:
+    """Return the standard deviations before anything was measured, at rest or in motion."""
+    return INITIAL_STD | (MOVING_START_STD if moving else {})
+
+
 class SlowStatePrior:
     """What is known of the slow states, carried from window to window.
 
@@ -68,7 +73,7 @@ class SlowStatePrior:
         self, imu: Imu | None, *, has_motor: bool, moving: bool, frozen: Iterable[str]
     ) -> None:
         names = _frozen_names(frozen, has_imu=imu is not None, has_motor=has_motor)
-        std = INITIAL_STD | (MOVING_START_STD if moving else {})
+        std = initial_std(moving=moving)
         self.frozen = np.zeros(N_STATES, dtype=bool)
         self._information = np.zeros((N_STATES, N_STATES))
         self._offset = np.zeros(N_STATES)
@@ -94,12 +99,13 @@ class SlowStatePrior:
         """Take the current value of one state for its mean."""
         self._offset[SLICES[name]] = 0.0
 
-    def tighten(self, name: str, std: NDArray[np.float64]) -> None:
-        """Replace the prior of one state by independent standard deviations."""
+    def reset(self, name: str, std: float | NDArray[np.float64]) -> None:
+        """Replace what is known of one state by independent standard deviations about its value."""
         index = np.arange(N_STATES)[SLICES[name]]
         self._information[index, :] = 0.0
         self._information[:, index] = 0.0
-        self._information[index, index] = std**-2.0
+        self._information[index, index] = np.asarray(std) ** -2.0
+        self._offset[index] = 0.0
 
     def carry(
         self,

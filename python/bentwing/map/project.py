@@ -13,7 +13,7 @@ from bentwing.map.chunk import MapChunk
 from bentwing.recording.batches import LidarBatch
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterable, Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -32,6 +32,7 @@ def project(
     trajectory: Trajectory,
     calibration: Calibration,
     *,
+    segments: Sequence[tuple[float, float]] = (),
     threads: int | None = None,
     counts: dict[str, int] | None = None,
 ) -> Iterator[MapChunk]:
@@ -42,6 +43,8 @@ def project(
     batches : stream of the recording; what is not lidar is passed over
     trajectory : poses of the IMU in the map, at a uniform rate
     calibration : latency and mount of the lidar
+    segments : first and last time of each stretch of the trajectory without a break, s; default:
+        all of it is one
     threads : default: all cores
     counts : receives `map.points`, `map.outside_trajectory` and `map.not_finite`
 
@@ -58,7 +61,7 @@ def project(
         if turned and batch.angles is None:
             msg = "batch.angles: expected the motor's angle of every return, got None"
             raise ValueError(msg)
-        batch = _placeable(batch, trajectory, calibration, counts)
+        batch = _placeable(batch, trajectory, segments, calibration, counts)
         if len(batch.times):
             angles = batch.angles if turned else None
             yield MapChunk(
@@ -71,10 +74,18 @@ def project(
 
 
 def _placeable(
-    batch: LidarBatch, trajectory: Trajectory, calibration: Calibration, counts: dict[str, int]
+    batch: LidarBatch,
+    trajectory: Trajectory,
+    segments: Sequence[tuple[float, float]],
+    calibration: Calibration,
+    counts: dict[str, int],
 ) -> LidarBatch:
     """Leave out, and count, what the trajectory does not cover or is not finite."""
-    covered = trajectory.covers(batch.times - calibration.latency)
+    times = batch.times - calibration.latency
+    covered = trajectory.covers(times)
+    if segments:
+        inside = [(times >= first) & (times <= last) for first, last in segments]
+        covered &= np.any(inside, axis=0)
     finite = np.isfinite(batch.points).all(axis=1)
     counts["map.outside_trajectory"] += int(np.count_nonzero(~covered))
     counts["map.not_finite"] += int(np.count_nonzero(covered & ~finite))

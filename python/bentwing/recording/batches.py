@@ -58,6 +58,10 @@ class ImuBatch:
     gyro: NDArray[np.float64]
     accel: NDArray[np.float64]
 
+    def where(self, keep: NDArray[np.bool_] | NDArray[np.intp] | slice) -> ImuBatch:
+        """Return the samples selected by a mask, by indices or by a slice."""
+        return ImuBatch(self.times[keep], self.gyro[keep], self.accel[keep])
+
 
 @dataclass(frozen=True, slots=True)
 class EncoderBatch:

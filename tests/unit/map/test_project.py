@@ -102,6 +102,14 @@ def test_what_cannot_be_placed_is_dropped_and_counted():
     assert counts == {"map.points": 2, "map.outside_trajectory": 2, "map.not_finite": 1}
 
 
+def test_what_was_seen_in_a_break_of_the_trajectory_is_dropped():
+    stamps = np.array([0.1, 0.5, 0.9]) + LATENCY
+    batch = LidarBatch(np.ones((3, 3)), stamps, intensity=np.arange(3, dtype=np.float32))
+    segments = [(0.0, 0.4), (0.6, 1.0)]
+    (chunk,) = project([batch], trajectory(), calibration(), segments=segments)
+    assert chunk.intensity.tolist() == [0, 2]
+
+
 def test_small_batches_are_joined_into_chunks_of_bounded_size(monkeypatch):
     monkeypatch.setattr(room, "POINTS_PER_CHUNK", 50)
     batches = [LidarBatch(np.ones((20, 3)), np.full(20, 0.01 * i)) for i in range(10)]

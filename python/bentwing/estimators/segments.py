@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""Where a recording breaks, and the stretches of trajectory between the breaks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bentwing import geometry
+from bentwing.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+# After a longer silence the estimate may have lost its place, s: without the IMU because a spinning
+# head turns by a radian at an unknown rate; without the lidar because the integrated noise of the
+# IMU has become decimetres.
+MAX_IMU_GAP = 0.3
+MAX_LIDAR_GAP = 5.0
+MAX_LIDAR_GAP_WITHOUT_IMU = 1.0
+# Whether the place was lost shows in the windows that end this long after a silence, s.
+JUDGED = (1.5, 6.0)
+# An estimate that fell into wrong matches leaves this much smaller a share of them as inliers.
+LOST_INLIERS = 0.03
+# The motion at the end of a segment is taken from this much of it, s.
+RECENT = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class Break:
+    """A silence of one sensor: its last stamp before and its first stamp after, s."""
+
+    sensor: str
+    start: float
+    stop: float
+
+    def sentence(self, *, bridged: bool) -> str:
+        """Say what happened and what became of it."""
+        what = f"no {self.sensor} data from {self.start:.2f} to {self.stop:.2f} s"
+        if bridged:
+            return (
+                f"{what}: the trajectory there is a guess; what was seen before and after fits "
+                "together"
+            )
+        return (
+            f"{what}, and what was seen before and after does not fit together: the trajectory "
+            "begins anew there, in the direction of the last motion; what follows is accurate in "
+            "itself, but its place relative to what came before is a guess"
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Segment:
+    """Poses at a uniform rate without a break: times (N,), positions (N, 3), quats_xyzw (N, 4)."""
+
+    times: NDArray[np.float64]
+    positions: NDArray[np.float64]
+    quats_xyzw: NDArray[np.float64]
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """First and last time, s."""
+        return float(self.times[0]), float(self.times[-1])
+
+    def extrapolated(self, time: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Position (3,) and attitude (4,) at a later time if the last motion goes on."""
+        dt = self.times[1] - self.times[0]
+        n = min(round(RECENT / dt), len(self.times) - 1)
+        share = (time - self.times[-1]) / (n * dt)
+        velocity = self.positions[-1] - self.positions[-1 - n]
+        before, last = self.quats_xyzw[-1 - n][None], self.quats_xyzw[-1][None]
+        turn = geometry.log(geometry.multiply(last, geometry.inverse(before)))
+        quat = geometry.multiply(geometry.exp(share * turn), last)
+        return self.positions[-1] + share * velocity, quat.reshape(4)
+
+
+def found_again(windows: Sequence[dict[str, Any]], silence: Break) -> bool:
+    """Whether the windows after a silence fit their surroundings as well as those before."""
+    before = [w["inlier_share"] for w in windows if w["time"] <= silence.start]
+    first, last = silence.stop + JUDGED[0], silence.stop + JUDGED[1]
+    after = [w["inlier_share"] for w in windows if first <= w["time"] <= last]
+    if not before or not after:
+        return False
+    return bool(np.mean(after) > np.median(before) - LOST_INLIERS)
+
+
+def heading(quat: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the part (4,) of a rotation (4,) that turns about the vertical."""
+    twist = np.array([0.0, 0.0, quat[2], quat[3]])
+    length = np.linalg.norm(twist)
+    return np.array([0.0, 0.0, 0.0, 1.0]) if length < 1e-9 else twist / length
+
+
+def joined(segments: Sequence[Segment], dt: float) -> Trajectory:
+    """One trajectory at a uniform rate, with straight motion over the breaks."""
+    if len(segments) == 1:
+        only = segments[0]
+        return Trajectory(only.times, only.positions, only.quats_xyzw)
+    poses = Trajectory(
+        np.concatenate([s.times for s in segments]),
+        np.concatenate([s.positions for s in segments]),
+        np.concatenate([s.quats_xyzw for s in segments]),
+    )
+    first, last = segments[0].times[0], segments[-1].times[-1]
+    times = np.minimum(first + dt * np.arange(round((last - first) / dt) + 1), last)
+    return Trajectory(times, *poses.interpolate(times))

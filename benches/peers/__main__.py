@@ -25,6 +25,7 @@ from benches.peers.engines import ENGINES
 from benches.peers.prepare import prepare
 from benches.peers.runner import Source, run, short
 
+from bentwing.errors import BentwingError
 from bentwing.recording import Payload, Recording
 from bentwing.trajectory import read_tum
 
@@ -87,8 +88,7 @@ def on_simulated(folders: list[Path], options: argparse.Namespace, scratch: Path
     print(table.head())
     results = []
     for number, recording in enumerate(folders):
-        found = on_one(recording, options, scratch / f"{number}-{recording.name}")
-        results += found
+        results += on_one(recording, options, scratch / f"{number}-{recording.name}")
     print(f"\n{table.NOTES}")
     if options.stamps:
         print(table.head(table.STAMPS_COLUMNS))
@@ -130,7 +130,7 @@ def scored(name: str, feed, out: Path, truth: scoring.Truth) -> dict:
             )
         estimate = scoring.peer_trajectory(out / "poses.npz", feed, engine, truth.origin_ns)
         return scoring.score(estimate, truth, lambda: scoring.peer_points(estimate, feed, truth))
-    except (ValueError, ArithmeticError) as error:
+    except (BentwingError, ValueError, ArithmeticError, OSError) as error:
         return {"failure": short(f"lost: {error}")}
 
 

@@ -49,6 +49,11 @@ ENGINES = {
     for engine in (
         Engine("bentwing", package="bentwing"),
         _evalio("kiss-icp", "KissICP", settings={"deskew": True, "max_num_threads": 1}),
+        _evalio(
+            "kiss-icp-fine",
+            "KissICP",
+            settings={"voxel_size": 0.5, "deskew": True, "max_num_threads": 1},
+        ),
         Engine(
             "genz-icp",
             "genz_icp_engine",

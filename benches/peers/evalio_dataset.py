@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
 """Simulated recordings as a dataset of evalio: those in `$EVALIO_DATA/simulated/`.
 
-`evalio -M benches.peers.evalio_dataset run -d 'simulated/*' -p dlio …`
+`EVALIO_CUSTOM=benches.peers.evalio_dataset evalio run -d 'simulated/*' -p dlio …`
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""bentwing as a pipeline of evalio: `evalio -M benches.peers.evalio_pipeline run -p bentwing …`."""
+"""bentwing as a pipeline of evalio: `EVALIO_CUSTOM=benches.peers.evalio_pipeline evalio run -p bentwing …`."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from bentwing.recording import LidarBatch, Payload
 
 FIRING = {"vlp16": 55.296e-6}
-"""s between shots of one beam; of other kinds by the most shots that any sweep has returned."""
+"""s between shots of one beam, so that those without a return leave their place empty."""
 EARLY = 1e-6
 """s; a sweep is cut off so much before the next one's stamp, whose first shots rounding may move."""
 REACH = 0.2
@@ -52,7 +52,7 @@ def prepare(recording: Path, payload: Payload, folder: Path, latency: float = 0.
     samples = read(recording, payload, latency)
     if payload.encoder is not None:
         return _joined(samples, payload, folder)
-    if samples.lidar.ring is None:
+    if samples.planar:
         return _stabilized(samples, payload, folder)
     return _sweeps(samples, payload, folder)
 
@@ -67,19 +67,36 @@ def _sweeps(samples: Samples, payload: Payload, folder: Path) -> Feed:
     starts = np.sort(samples.sweeps) - EARLY
     period = float(np.median(np.diff(starts)))
     rows = scans.cut(lidar.times, starts)
-    most = max(int(np.bincount(lidar.ring[part]).max()) for part in rows)
-    step = FIRING.get(payload.lidar.kind, period / most)
-    shape = int(lidar.ring.max()) + 1, int(period / step)
     firsts = lidar.times[[part.start for part in rows]]
     begins = (starts[np.searchsorted(starts, firsts, "right") - 1] + EARLY).tolist()
+    ends = [begin + period for begin in begins]
+    shape, step = _raster(lidar, rows, period, payload.lidar.kind)
     tables = (
-        scans.organised(_packed(lidar, part, begin), *shape, step)
+        _organised(_packed(lidar, part, begin), shape, step)
         for part, begin in zip(rows, begins, strict=True)
     )
-    ends = [begin + period for begin in begins]
     cut = Cut("sweeps", rows, begins, ends, payload.T_imu_lidar_matrix(), shape)
     imu = _imu(samples, stabilized=False)
     return write_feed(folder, _head(samples, payload, cut), imu, tables)
+
+
+def _raster(
+    lidar: LidarBatch, rows: list[slice], period: float, kind: str
+) -> tuple[tuple[int, int], float | None]:
+    """Beams and shots of each, and the time between these where it is known of the kind."""
+    if lidar.ring is None:
+        return (1, max(part.stop - part.start for part in rows)), None
+    beams = int(lidar.ring.max()) + 1
+    if (step := FIRING.get(kind)) is not None:
+        return (beams, int(period / step)), step
+    return (beams, max(int(np.bincount(lidar.ring[part]).max()) for part in rows)), None
+
+
+def _organised(scan: np.ndarray, shape: tuple[int, int], step: float | None) -> np.ndarray:
+    if shape[0] == 1:
+        return scan
+    column = scans.column_by_order(scan) if step is None else scans.column_by_time(scan, step)
+    return scans.organised(scan, shape, column)
 
 
 def _joined(samples: Samples, payload: Payload, folder: Path) -> Feed:

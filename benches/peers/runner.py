@@ -68,7 +68,7 @@ def unfit(engine: Engine, feed: Feed) -> str | None:
     """Why an engine cannot take such scans at all."""
     if engine.needs_imu and feed.imu is None:
         return "needs an IMU"
-    if engine.needs_rings and feed.head.kind != "sweeps":
+    if engine.needs_rings and feed.head.rows == 1:
         return "needs rings"
     if engine.needs_raw_points and feed.head.kind == "stabilized":
         return "needs points as measured"

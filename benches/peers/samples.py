@@ -20,25 +20,33 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Samples:
-    """A whole recording, times on the IMU's clock in s since `start_ns`."""
+    """A whole recording, times on the IMU's clock in s since `start_ns`.
+
+    Attributes
+    ----------
+    sweeps : s, when each message of the lidar says that it begins
+    planar : whether it is a 2D lidar
+    """
 
     start_ns: int
     lidar: LidarBatch
     imu: ImuBatch | None
     sweeps: np.ndarray
+    planar: bool
 
 
 def read(path: Path, payload: Payload, latency: float) -> Samples:
     with Recording(path, payload) as recording:
         stream = list(preprocess(recording.batches(), payload, Counter()))
         start_ns, topic = recording.start_ns, recording.lidar_topic
+        planar = recording.lidar_type.endswith("LaserScan")
     lidar = _together([b for b in stream if isinstance(b, LidarBatch)], -latency)
     imu = [b for b in stream if isinstance(b, ImuBatch)]
     stamps = 1e-9 * (_header_stamps(path, topic) - start_ns) - latency
     if not imu or payload.imu is None:
-        return Samples(start_ns, lidar, None, stamps)
+        return Samples(start_ns, lidar, None, stamps, planar)
     parts = ([getattr(b, name) for b in imu] for name in ("times", "gyro", "accel"))
-    return Samples(start_ns, lidar, ImuBatch(*map(np.concatenate, parts)), stamps)
+    return Samples(start_ns, lidar, ImuBatch(*map(np.concatenate, parts)), stamps, planar)
 
 
 def _together(batches: list[LidarBatch], later: float) -> LidarBatch:

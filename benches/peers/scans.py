@@ -83,19 +83,31 @@ def packed(
     return table
 
 
-def organised(scan: np.ndarray, rows: int, columns: int, step: float) -> np.ndarray:
+def column_by_time(scan: np.ndarray, step: float) -> np.ndarray:
+    """Column (N,) of each shot of a sweep whose beams fire every `step` s."""
+    # Rounded to the step below but for what whole nanoseconds have taken away.
+    return (1e-9 * scan["t"] / step + 1e-3).astype(int)
+
+
+def column_by_order(scan: np.ndarray) -> np.ndarray:
+    """Column (N,) by the order in each ring, where it is not known when beams fire."""
+    order = np.argsort(scan["ring"], kind="stable")
+    rings = scan["ring"][order]
+    columns = np.empty(len(scan), int)
+    columns[order] = np.arange(len(scan)) - np.searchsorted(rings, rings)
+    return columns
+
+
+def organised(scan: np.ndarray, shape: tuple[int, int], column: np.ndarray) -> np.ndarray:
     """Row by row with a place for every shot, as a driver would publish it; no return is all zero.
 
     Parameters
     ----------
     scan : (N,) of `POINT`, one sweep
-    rows, columns : beams, and shots of each per sweep
-    step : s, from one column to the next
+    shape : beams, and shots of each per sweep
+    column : (N,) of each shot
     """
-    image = np.zeros((rows, columns), POINT)
-    image["ring"] = np.arange(rows)[:, None]
-    image["t"] = np.rint(1e9 * step * np.arange(columns))
-    # Rounded to the step below but for what whole nanoseconds have taken away.
-    column = np.minimum((1e-9 * scan["t"] / step + 1e-3).astype(int), columns - 1)
-    image[scan["ring"], column] = scan
+    image = np.zeros(shape, POINT)
+    image["ring"] = np.arange(shape[0])[:, None]
+    image[scan["ring"], np.minimum(column, shape[1] - 1)] = scan
     return image.reshape(-1)

@@ -117,9 +117,17 @@ def test_an_organised_sweep_has_a_place_for_every_shot() -> None:
     table_["ring"] = [0, 1, 0, 1, 0, 1]
     # The second beam fires a little after the first; nanoseconds are rounded.
     table_["t"] = np.rint(1e9 * (step * np.array([0, 0, 1, 1, 3, 3]) + 34e-6 * table_["ring"]))
-    image = scans.organised(table_, 2, 4, step).reshape(2, 4)
+    image = scans.organised(table_, (2, 4), scans.column_by_time(table_, step)).reshape(2, 4)
     np.testing.assert_array_equal(image["x"], [[1, 3, 0, 5], [2, 4, 0, 6]])
     np.testing.assert_array_equal(image["ring"], [[0] * 4, [1] * 4])
+
+
+def test_where_shots_without_return_are_not_known_the_order_in_a_ring_counts() -> None:
+    table_ = np.zeros(5, scans.POINT)
+    table_["x"] = np.arange(1, 6)
+    table_["ring"] = [1, 0, 1, 1, 0]
+    image = scans.organised(table_, (2, 3), scans.column_by_order(table_)).reshape(2, 3)
+    np.testing.assert_array_equal(image["x"], [[2, 5, 0], [1, 3, 4]])
 
 
 def test_the_attitude_by_the_gyro_is_that_of_the_motion() -> None:
@@ -248,10 +256,11 @@ def test_an_end_is_told_in_a_few_words(tmp_path, finished, outcome, expected) ->
 
 
 def test_engines_are_not_given_what_they_cannot_take() -> None:
-    def fed(kind, imu=True):
-        return SimpleNamespace(head=head(kind=kind), imu=imu or None)
+    def fed(kind, rows=1, imu=True):
+        return SimpleNamespace(head=head(kind=kind, rows=rows), imu=imu or None)
 
     assert runner.unfit(ENGINES["lio-sam"], fed("joined")) == "needs rings"
+    assert runner.unfit(ENGINES["lio-sam"], fed("sweeps", rows=16)) is None
     assert runner.unfit(ENGINES["rko-lio"], fed("sweeps", imu=False)) == "needs an IMU"
     assert runner.unfit(ENGINES["kiss-icp"], fed("stabilized")) is None
 

@@ -92,7 +92,7 @@ def on_simulated(folders: list[Path], options: argparse.Namespace, scratch: Path
     print(f"\n{table.NOTES}")
     if options.stamps:
         print(table.head(table.STAMPS_COLUMNS))
-        print("\n".join(table.stamps_row(r) for r in results if "clock_left" in r["score"]))
+        print("\n".join(table.stamps_row(r) for r in results if r["score"] and not r["failure"]))
     return results
 
 

@@ -57,7 +57,7 @@ def parsed() -> argparse.Namespace:
     add("--duration", type=float, default=60.0, help="of each simulated flight, in s")
     add("--motor-rate", type=float, default=1.0, help="of simulated motors, in rad/s")
     add("--engines", nargs="+", default=list(ENGINES), choices=list(ENGINES), metavar="ENGINE")
-    add("--repeats", type=int, default=1, help="rounds of all engines; the middle cost is shown")
+    add("--repeats", type=int, default=1, help="rounds of all engines; the middle is shown")
     add("--timeout", type=float, default=900.0, help="s of wall time for one engine")
     add("--stamps", action="store_true", help="also how well the assumed pose stamps fit")
     add("--keep", type=Path, help="keep scans, poses and logs in this folder")

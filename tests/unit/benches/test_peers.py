@@ -232,11 +232,16 @@ def test_a_failed_engine_keeps_its_row() -> None:
     assert refused.count("|") - 1 == len(table.COLUMNS)
 
 
-def test_the_middle_of_rounds_is_that_of_their_cost() -> None:
+def test_the_middle_of_rounds_is_that_of_their_cost_and_of_their_error() -> None:
     rounds = [
-        result(cost={"seconds": s, "cpu": s / 2, "megabytes": 100.0}) for s in (9.0, 1.0, 4.0)
+        result(cost={"seconds": s, "cpu": s / 2, "megabytes": 100.0}, score={"ate_flight": error})
+        for s, error in ((9.0, 0.1), (1.0, 0.3), (4.0, 0.2))
     ]
-    assert table.middle(rounds)["cost"] == {"seconds": 4.0, "cpu": 2.0, "megabytes": 100.0}
+    found = table.middle(rounds)
+    assert found["cost"] == {"seconds": 4.0, "cpu": 2.0, "megabytes": 100.0}
+    assert found["score"] == {"ate_flight": 0.2}
+    lost = result(failure="lost", score={})
+    assert table.middle([rounds[0], lost, lost])["failure"] == "lost"
 
 
 @pytest.mark.parametrize(

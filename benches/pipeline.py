@@ -9,16 +9,16 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import statistics
 import sys
 import tempfile
 import time
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from itertools import product
 from pathlib import Path
 
 import numpy as np
+from cost import Cost, python
 from scoring import score
 
 COLUMNS = (
@@ -30,30 +30,12 @@ STAGES = ("estimate", "map", "report")
 RESULTS = Path(__file__).parent / "results" / "pipeline.json"
 
 
-@dataclass(frozen=True, slots=True)
-class Cost:
-    """Wall time and processor time in s and peak resident memory in MB of one command."""
-
-    seconds: float
-    cpu: float
-    megabytes: float
-
-
 def run(*arguments: str | Path) -> Cost:
     """Run one bentwing command; its own output goes to stderr."""
-    command = ["-c", "from bentwing.cli.main import run; run()", *map(str, arguments)]
-    start = time.perf_counter()
-    child = os.posix_spawn(
-        sys.executable,
-        [sys.executable, *command],
-        os.environ,
-        file_actions=[(os.POSIX_SPAWN_DUP2, 2, 1)],
-    )
-    _, status, usage = os.wait4(child, 0)
-    if code := os.waitstatus_to_exitcode(status):
-        sys.exit(f"bentwing {' '.join(map(str, arguments))}: exit code {code}")
-    seconds = time.perf_counter() - start
-    return Cost(seconds, usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024)
+    finished = python("-c", "from bentwing.cli.main import run; run()", *arguments)
+    if finished.code:
+        sys.exit(f"bentwing {' '.join(map(str, arguments))}: exit code {finished.code}")
+    return finished.cost
 
 
 def measure(scene: str, head: str, seed: int, options: argparse.Namespace) -> dict:

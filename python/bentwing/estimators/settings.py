@@ -20,12 +20,12 @@ class SurfelSettings(_Section):
     max_gap: float = Field(0.08, gt=0, description="a longer pause splits a cell, s")
     max_span: float = Field(0.3, gt=0, description="longest time in a surfel, s")
     min_points: int = Field(6, ge=4)
-    min_planarity: float = Field(0.3, ge=0, le=1, description="2 (l2 - l1) / (l1 + l2 + l3)")
+    min_planarity: float = Field(0.5, ge=0, le=1, description="2 (l2 - l1) / (l1 + l2 + l3)")
     min_width_ratio: float = Field(0.03, ge=0, le=1, description="l2 / l3")
     min_width: float = Field(
         0.05, ge=0, description="sqrt(l2) in voxels; rejects single scan lines"
     )
-    max_rate: float = Field(4000.0, gt=0, description="most surfels per second of data")
+    max_rate: float = Field(2000.0, gt=0, description="most surfels per second of data")
 
 
 class RegistrationSettings(_Section):
@@ -65,7 +65,7 @@ class ContinuousSettings(_Section):
     )
     view_length: float = Field(1.5, gt=0, description="of a fixed view, s")
     view_distance: float = Field(1.5, gt=0, description="motion that renews the fixed views, m")
-    n_views: int = Field(2, ge=0)
+    n_views: int = Field(4, ge=0)
     frozen: tuple[str, ...] = Field(
         (), description="slow states that are not estimated: latency, extrinsic_rotation, …"
     )

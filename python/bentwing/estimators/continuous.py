@@ -3,40 +3,30 @@
 
 from __future__ import annotations
 
-from copy import deepcopy
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import numpy as np
-
-from bentwing import _core, geometry
 from bentwing.errors import EstimationError, NotEnoughDataError
+from bentwing.estimators.beginning import Situation, begin_pass
 from bentwing.estimators.buffer import BatchBuffer
 from bentwing.estimators.core_settings import CoreSettings
-from bentwing.estimators.core_states import core_globals, refined_mount
-from bentwing.estimators.interface import Calibration, Estimate
 from bentwing.estimators.mount import described_mount
 from bentwing.estimators.odometry_pass import DT, MARGIN, OdometryPass
+from bentwing.estimators.outcome import estimate_of
 from bentwing.estimators.segments import (
     JUDGED,
     MAX_IMU_GAP,
     Break,
-    Segment,
     found_again,
-    heading,
-    joined,
 )
 from bentwing.estimators.settings import ContinuousSettings
-from bentwing.estimators.slow_states import SlowStatePrior, initial_std, named_std
 from bentwing.estimators.start import (
-    STANDARD_GRAVITY,
     Start,
-    attitude_of,
     find_start,
     level_start,
-    levelling,
 )
 
 if TYPE_CHECKING:
+    from bentwing.estimators.interface import Estimate
     from bentwing.recording import Batch, Payload
 
 # A rest shorter than this is waited out before the start is judged, s.
@@ -142,7 +132,7 @@ class Continuous:
                     f"less than {self._sliding.shift:g} s of lidar points; nothing can be estimated"
                 )
                 raise NotEnoughDataError(msg)
-            return self._estimate(self._before)
+            return estimate_of(self._before, self._mount, self._notes)
         return self.estimate(done)
 
     @property
@@ -200,79 +190,26 @@ class Continuous:
         self._pass = self._new_pass(self._start, None)
         return True
 
-    def _new_pass(self, start: Start, learned: OdometryPass | None) -> OdometryPass:
-        # What a short rehearsal says of the biases is not worth keeping.
-        keep = learned is not None and not self._rehearsals
-        slow = learned.globals.levelled() if learned and keep else self._initial_globals(start)
-        if learned is not None and keep and start.static is not None:
-            prior = deepcopy(learned.prior)  # the rehearsed pass may go on
-            prior.recentre("gravity")
-        else:
-            prior = self._initial_prior(start)
-        begun = OdometryPass(
-            self._first_samples(start, learned, slow),
-            slow,
-            prior,
-            self._sliding,
-            self._core,
-            threads=self._threads,
-            resting=start.static is not None,
+    def _new_pass(self, start: Start, rehearsed: OdometryPass | None) -> OdometryPass:
+        begun = begin_pass(
+            Situation(
+                self._payload,
+                self._mount,
+                self._sliding,
+                self._core,
+                self._threads,
+                has_imu=self._buffer.has_imu,
+            ),
+            start,
+            self._first,
+            rehearsed,
+            # What a short rehearsal says of the biases is not worth keeping.
+            keep=not self._rehearsals,
+            before=self._before[-1] if self._before else None,
         )
         if start.static is not None and self.settings.n_views:
             begun.look_around(self._buffer)
         return begun
-
-    def _initial_globals(self, start: Start) -> _core.Globals:
-        if self._before:
-            return self._before[-1].globals.levelled()
-        return core_globals(
-            Calibration(
-                latency=0.0,
-                mount=self._mount,
-                gyro_bias=start.gyro_bias,
-                accel_bias=start.accel_bias,
-                gravity=np.array([0.0, 0.0, STANDARD_GRAVITY]),
-            )
-        )
-
-    def _initial_prior(self, start: Start) -> SlowStatePrior:
-        moving = start.static is None
-        if self._before:
-            inherited = deepcopy(self._before[-1].prior)
-            inherited.reset("gravity", initial_std(moving=moving)["gravity"])
-            return inherited
-        has_imu = self._buffer.has_imu and self._payload.imu is not None
-        prior = SlowStatePrior(
-            self._payload.imu if has_imu else None,
-            has_motor=self._payload.encoder is not None,
-            moving=moving,
-            frozen=self.settings.frozen,
-        )
-        if start.static is not None:
-            prior.reset("gyro_bias", start.static.gyro_bias_std)
-        return prior
-
-    def _first_samples(
-        self, start: Start, learned: OdometryPass | None, slow: _core.Globals
-    ) -> _core.Samples:
-        """Return the rest at the start, or the first two poses of a start in motion."""
-        if start.static is None and learned is not None:
-            _, positions, quats = learned.trajectory()
-            level = levelling(learned.globals.gravity)
-            positions = geometry.rotate(level, positions[:2] - positions[0])
-            quats = geometry.multiply(np.stack([level, level]), quats[:2])
-        else:
-            n = max(2, int((start.hold - self._first) / DT) + 1)
-            quat = start.quat_xyzw
-            if start.static is not None:
-                quat = attitude_of(start.static.accel_mean - slow.accel_bias)
-            positions, quats = np.zeros((n, 3)), np.repeat(quat[None], n, axis=0)
-        if self._before:
-            at, quat = self._segments(self._before)[-1].extrapolated(self._first)
-            turn = heading(geometry.multiply(quat, geometry.inverse(quats[0])))
-            positions = at + geometry.rotate(turn, positions)
-            quats = geometry.multiply(np.broadcast_to(turn, quats.shape), quats)
-        return _core.Samples(self._first, DT, positions, quats)
 
     def _step(self, ready: float, *, finishing: bool) -> bool:
         """Register the next window if its data is complete; returns whether it was."""
@@ -348,61 +285,4 @@ class Continuous:
 
     def estimate(self, last: OdometryPass) -> Estimate:
         """Return what the passes before the last break and this one say, levelled."""
-        return self._estimate([*self._before, last])
-
-    def _estimate(self, passes: list[OdometryPass]) -> Estimate:
-        segments, last = self._segments(passes), passes[-1]
-        windows = [w for p in passes for w in p.windows]
-        n_blind = sum(p.n_blind for p in passes)
-        slow = last.globals
-        calibration = Calibration(
-            latency=slow.latency,
-            mount=refined_mount(self._mount, slow),
-            gyro_bias=slow.gyro_bias,
-            accel_bias=slow.accel_bias,
-            gravity=np.array([0.0, 0.0, STANDARD_GRAVITY]),
-            std=named_std(last.covariance, last.prior.frozen),
-        )
-        return Estimate(
-            joined(segments, DT),
-            calibration,
-            segments=[s.span for s in segments],
-            windows=windows,
-            counts={
-                "estimate.windows": len(windows),
-                "estimate.samples_without_imu": n_blind,
-            },
-            timings={name: sum(p.timings[name] for p in passes) for name in last.timings},
-            warnings=_warnings(windows, n_blind) + self._notes,
-        )
-
-    def _segments(self, passes: list[OdometryPass]) -> list[Segment]:
-        """Return the trajectories of passes, each levelled about its first position."""
-        segments = []
-        for done in passes:
-            times, positions, quats = done.trajectory()
-            level = levelling(done.globals.gravity)
-            segments.append(
-                Segment(
-                    times,
-                    positions[0] + geometry.rotate(level, positions - positions[0]),
-                    geometry.multiply(np.broadcast_to(level, quats.shape), quats),
-                )
-            )
-        return segments
-
-
-def _warnings(windows: list[dict[str, Any]], n_blind: int) -> list[str]:
-    sentences = []
-    degenerate = [w["time"] for w in windows if w["degenerate"]]
-    if degenerate:
-        sentences.append(
-            f"{len(degenerate)} of {len(windows)} windows see too little in some direction "
-            f"(first at {degenerate[0]:.1f} s): the IMU carries the estimate there"
-        )
-    # The trajectory is carried a little beyond the last stamps, always without data.
-    if n_blind * DT > 2 * MARGIN:
-        sentences.append(
-            f"{n_blind * DT:.2f} s have no inertial data: the motion went on at constant velocity there"
-        )
-    return sentences
+        return estimate_of([*self._before, last], self._mount, self._notes)

@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""The first poses and slow states of a pass: at rest, in motion, rehearsed, or after a break."""
+
+from __future__ import annotations
+
+from copy import deepcopy
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bentwing import _core, geometry
+from bentwing.estimators.core_states import core_globals
+from bentwing.estimators.interface import Calibration
+from bentwing.estimators.odometry_pass import DT, OdometryPass
+from bentwing.estimators.outcome import segment_of
+from bentwing.estimators.segments import heading
+from bentwing.estimators.slow_states import SlowStatePrior, initial_std
+from bentwing.estimators.start import STANDARD_GRAVITY, attitude_of, levelling
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from bentwing.estimators.core_settings import CoreSettings
+    from bentwing.estimators.mount import Mount
+    from bentwing.estimators.settings import ContinuousSettings
+    from bentwing.estimators.start import Start
+    from bentwing.recording import Payload
+
+
+@dataclass(frozen=True, slots=True)
+class Situation:
+    """What the passes over a recording have in common."""
+
+    payload: Payload
+    mount: Mount
+    settings: ContinuousSettings
+    core: CoreSettings
+    threads: int
+    has_imu: bool
+
+
+def begin_pass(
+    situation: Situation,
+    start: Start,
+    first: float,
+    rehearsed: OdometryPass | None,
+    *,
+    keep: bool,
+    before: OdometryPass | None,
+) -> OdometryPass:
+    """Return a pass with its first samples and what is known of the slow states.
+
+    Parameters
+    ----------
+    first : time of the first sample, s
+    rehearsed : an earlier pass over the same seconds
+    keep : whether what it has learned of the slow states is worth keeping
+    before : the pass up to the last break
+    """
+    known = rehearsed if keep and rehearsed is not None else before
+    slow = _described(situation, start) if known is None else known.globals.levelled()
+    if rehearsed is not None and keep and start.static is not None:
+        prior = deepcopy(rehearsed.prior)  # the rehearsed pass may go on
+        prior.recentre("gravity")
+    else:
+        prior = _prior(situation, start, before)
+    positions, quats = _first_poses(start, first, rehearsed, slow)
+    if before is not None:
+        at, quat = segment_of(before).extrapolated(first)
+        turn = heading(geometry.multiply(quat, geometry.inverse(quats[0])))
+        positions = at + geometry.rotate(turn, positions)
+        quats = geometry.multiply(np.broadcast_to(turn, quats.shape), quats)
+    return OdometryPass(
+        _core.Samples(first, DT, positions, quats),
+        slow,
+        prior,
+        situation.settings,
+        situation.core,
+        threads=situation.threads,
+        resting=start.static is not None,
+    )
+
+
+def _described(situation: Situation, start: Start) -> _core.Globals:
+    return core_globals(
+        Calibration(
+            latency=0.0,
+            mount=situation.mount,
+            gyro_bias=start.gyro_bias,
+            accel_bias=start.accel_bias,
+            gravity=np.array([0.0, 0.0, STANDARD_GRAVITY]),
+        )
+    )
+
+
+def _prior(situation: Situation, start: Start, before: OdometryPass | None) -> SlowStatePrior:
+    moving = start.static is None
+    if before is not None:
+        inherited = deepcopy(before.prior)
+        inherited.reset("gravity", initial_std(moving=moving)["gravity"])
+        return inherited
+    prior = SlowStatePrior(
+        situation.payload.imu if situation.has_imu else None,
+        has_motor=situation.payload.encoder is not None,
+        moving=moving,
+        frozen=situation.settings.frozen,
+    )
+    if start.static is not None:
+        prior.reset("gyro_bias", start.static.gyro_bias_std)
+    return prior
+
+
+def _first_poses(
+    start: Start, first: float, rehearsed: OdometryPass | None, slow: _core.Globals
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the rest at the start, or the first two poses of a start in motion, from the origin."""
+    if start.static is None and rehearsed is not None:
+        _, positions, quats = rehearsed.trajectory()
+        level = levelling(rehearsed.globals.gravity)
+        positions = geometry.rotate(level, positions[:2] - positions[0])
+        return positions, geometry.multiply(np.stack([level, level]), quats[:2])
+    n = max(2, int((start.hold - first) / DT) + 1)
+    quat = start.quat_xyzw
+    if start.static is not None:
+        quat = attitude_of(start.static.accel_mean - slow.accel_bias)
+    return np.zeros((n, 3)), np.repeat(quat[None], n, axis=0)

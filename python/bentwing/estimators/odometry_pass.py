@@ -77,7 +77,8 @@ class OdometryPass:
         """Freeze what was seen at rest; a 2D lidar sees no surfels then, a 3D lidar its first view."""
         start = max(self._origin, self._end - self._settings.view_length)
         seen = self._extract(buffer.lidar(start, self._end))
-        self._views.add(_core.FixedView([seen], start, self._end, self.samples, self.globals))
+        view = _core.FixedView([seen], start, self._end, self.samples, self.globals)
+        self._views.add(view, self.samples.position_at(start))
 
     def step(self, buffer: BatchBuffer, end: float) -> None:
         """Take the lidar data up to `end`, s, and register the window that ends there."""
@@ -141,7 +142,7 @@ class OdometryPass:
         result = _core.register_window(
             window,
             [s for t, s in self._surfels if t >= start - 1e-6],
-            self._views.views,
+            self._views.around(self.samples.position_at(self._end)),
             imu,
             self.globals,
             information=self.prior.information,

@@ -59,13 +59,13 @@ class ContinuousSettings(_Section):
         description="new data per step without an IMU, s: how long velocities are extrapolated",
     )
     rehearsal: float = Field(
-        20.0,
+        10.0,
         ge=0,
         description="seconds after the start that are run twice, for the calibration; 0: never",
     )
     view_length: float = Field(1.5, gt=0, description="of a fixed view, s")
     view_distance: float = Field(1.5, gt=0, description="motion that renews the fixed views, m")
-    n_views: int = Field(4, ge=0)
+    n_views: int = Field(5, ge=0, description="fixed views in a window")
     frozen: tuple[str, ...] = Field(
         (), description="slow states that are not estimated: latency, extrinsic_rotation, …"
     )

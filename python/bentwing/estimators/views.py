@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,18 +22,38 @@ if TYPE_CHECKING:
 RICHER = 1.3
 
 
+# Views that are still known; more hold drift down over longer loops, for a megabyte each.
+MAX_POOL = 48
+# Of the views that take part so many are the newest; the others are those of the nearest places.
+N_NEWEST = 3
+
+
+@dataclass(frozen=True, slots=True)
+class _View:
+    surfels: _core.FixedView
+    place: NDArray[np.float64]
+
+
 class FixedViews:
-    """The newest views; a new one is frozen when the window's start has moved far enough."""
+    """Views along the way; a new one is frozen when the window's start has moved far enough."""
 
     def __init__(self, settings: ContinuousSettings) -> None:
-        self.views: list[_core.FixedView] = []
+        self._pool: list[_View] = []
         self._settings = settings
         self._place: NDArray[np.float64] | None = None
 
-    def add(self, view: _core.FixedView) -> None:
+    def add(self, view: _core.FixedView, place: NDArray[np.float64]) -> None:
         """Take a view in place of the oldest; one without surfels is passed over."""
         if len(view):
-            self.views = [*self.views, view][-self._settings.n_views :]
+            self._pool = [*self._pool, _View(view, place)][-MAX_POOL:]
+
+    def around(self, place: NDArray[np.float64]) -> list[_core.FixedView]:
+        """Return the newest views, and of the others those from nearest to `place` (3,)."""
+        n_newest = min(N_NEWEST, self._settings.n_views)
+        split = max(0, len(self._pool) - n_newest)
+        others = sorted(self._pool[:split], key=lambda v: float(np.linalg.norm(v.place - place)))
+        chosen = others[: self._settings.n_views - n_newest] + self._pool[split:]
+        return [v.surfels for v in chosen]
 
     def update(
         self,
@@ -52,8 +73,8 @@ class FixedViews:
             or np.linalg.norm(place - self._place) >= self._settings.view_distance
         )
         n_left = sum(int(((s.stamps >= start) & (s.stamps < window_start)).sum()) for s in left)
-        poorest = min((len(v) for v in self.views), default=0)
+        poorest = min((len(v.surfels) for v in self._pool[-N_NEWEST:]), default=0)
         if not moved and n_left < RICHER * poorest:
             return
-        self.add(_core.FixedView(left, start, window_start, samples, slow))
+        self.add(_core.FixedView(left, start, window_start, samples, slow), place)
         self._place = place

@@ -7,9 +7,6 @@ import heapq
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
-from rosbags.rosbag1 import Reader as Rosbag1Reader
-from rosbags.rosbag2 import Reader as Rosbag2Reader
-
 from bentwing.errors import RecordingError
 from bentwing.recording.bag_recovery import scan_bag
 from bentwing.recording.mcap_scan import scan_mcap
@@ -19,6 +16,8 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Sequence
 
     from rosbags.interfaces import Connection
+    from rosbags.rosbag1 import Reader as Rosbag1Reader
+    from rosbags.rosbag2 import Reader as Rosbag2Reader
 
 SUFFIXES = (".bag", ".mcap", ".db3")
 EXPECTED = "give a ROS 1 .bag, a ROS 2 bag folder, a .db3 or a .mcap file"
@@ -55,7 +54,7 @@ class RosbagsSource:
         # A ROS 2 folder may well be called something.bag.
         self.cdr = path.is_dir() or path.suffix != ".bag"
         self._path = path
-        self._reader = Rosbag2Reader(path) if self.cdr else Rosbag1Reader(path)
+        self._reader = _ros2_reader(path) if self.cdr else _ros1_reader(path)
         self._reader.open()
         infos = self._reader.topics
         self.topics = tuple(
@@ -93,6 +92,18 @@ class RosbagsSource:
     def close(self) -> None:
         """Close the files."""
         self._reader.close()
+
+
+def _ros1_reader(path: Path) -> Rosbag1Reader:
+    from rosbags.rosbag1 import Reader
+
+    return Reader(path)
+
+
+def _ros2_reader(path: Path) -> Rosbag2Reader:
+    from rosbags.rosbag2 import Reader  # slow to import, and no ROS 1 bag needs it
+
+    return Reader(path)
 
 
 class MergedSource:

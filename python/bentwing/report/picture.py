@@ -238,12 +238,16 @@ def _close_gaps(depth: NDArray[np.float32], front: NDArray[np.intp]) -> None:
     around = np.pad(depth, 1, constant_values=-np.inf)
     filled = np.isfinite(around).view(np.uint8)
     n_filled = sum(_moved(filled, step, 1) for step in _NEIGHBOURS)
-    row, column = np.nonzero((front < 0) & (n_filled >= _ENCLOSED))
-    steps = np.array(_NEIGHBOURS)
-    rows, columns = row + steps[:, :1], column + steps[:, 1:]  # (8, K)
-    nearest = np.argmax(around[rows + 1, columns + 1], axis=0)[None]
-    chosen = np.take_along_axis(rows, nearest, 0)[0], np.take_along_axis(columns, nearest, 0)[0]
-    depth[row, column], front[row, column] = depth[chosen], front[chosen]
+    empty = np.flatnonzero((front < 0) & (n_filled >= _ENCLOSED))
+    row, column = np.divmod(empty, depth.shape[1])
+    depths = around.ravel()
+    nearest, source = np.full(len(empty), -np.inf, np.float32), empty.copy()
+    for down, right in _NEIGHBOURS:
+        neighbour = depths.take((row + 1 + down) * around.shape[1] + column + 1 + right)
+        is_nearer = neighbour > nearest
+        np.copyto(nearest, neighbour, where=is_nearer)
+        np.copyto(source, empty + (down * depth.shape[1] + right), where=is_nearer)
+    depth.ravel()[empty], front.ravel()[empty] = nearest, front.ravel()[source]
 
 
 def _eye_dome(depth: NDArray[np.float32]) -> NDArray[np.float32]:

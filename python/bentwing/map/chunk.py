@@ -6,6 +6,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from bentwing.recording.batches import numbered, rows
+
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
@@ -35,10 +37,11 @@ class MapChunk:
 
     def where(self, keep: NDArray[np.bool_] | slice) -> MapChunk:
         """Return the points selected by a mask or a slice."""
+        chosen = numbered(keep)
         return MapChunk(
-            self.points[keep],
-            self.times[keep],
-            self.ranges[keep],
-            None if self.intensity is None else self.intensity[keep],
-            None if self.ring is None else self.ring[keep],
+            rows(self.points, chosen),
+            rows(self.times, chosen),
+            rows(self.ranges, chosen),
+            None if self.intensity is None else rows(self.intensity, chosen),
+            None if self.ring is None else rows(self.ring, chosen),
         )

@@ -15,11 +15,14 @@ from bentwing.map.writer import MapWriter
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from numpy.typing import NDArray
+
     from bentwing.map.chunk import MapChunk
 
 SCALE = 0.0001  # m; 0.05 mm of rounding at most, 214 km in each direction of the offset
 _OFFSET_STEP = 1000.0  # m; a local map gets offset 0, a georeferenced one a round number
 _MAX_INTENSITY = 65_535
+_ONLY_RETURN = 0x11  # return number 1 in the lower four bits, number of returns 1 in the upper
 
 
 class LasWriter(MapWriter):
@@ -48,22 +51,31 @@ class LasWriter(MapWriter):
 
     def _append(self, chunk: MapChunk) -> None:
         record = laspy.ScaleAwarePointRecord.zeros(len(chunk), header=self._header)
-        steps = np.rint((chunk.points - self._header.offsets) / SCALE)
-        if len(steps) and np.abs(steps).max() > np.iinfo(np.int32).max:
-            far = chunk.points[np.argmax(np.abs(steps).max(axis=1))]
-            msg = f"a map point lies at {far.round(1).tolist()} m, too far for a LAS file; the trajectory has diverged"
-            raise EstimationError(msg)
+        table = record.array
         for axis, name in enumerate("XYZ"):
-            record[name] = steps[:, axis].astype(np.int32)
-        record["gps_time"] = self._gps_origin + chunk.times
-        record["return_number"] = record["number_of_returns"] = np.ones(len(chunk), np.uint8)
-        record["range"] = chunk.ranges
+            table[name] = self._steps(chunk.points, axis)
+        table["gps_time"] = self._gps_origin + chunk.times
+        table["bit_fields"] = _ONLY_RETURN
+        table["range"] = chunk.ranges
         if chunk.intensity is not None:
             scaled = np.nan_to_num(chunk.intensity) * self._intensity_scale
-            record["intensity"] = np.clip(np.rint(scaled), 0, _MAX_INTENSITY).astype(np.uint16)
-        if chunk.ring is not None and "ring" in record.array.dtype.names:
-            record["ring"] = chunk.ring
+            table["intensity"] = np.clip(np.rint(scaled), 0, _MAX_INTENSITY)
+        if chunk.ring is not None and "ring" in table.dtype.names:
+            table["ring"] = chunk.ring
         self._writer.write_points(record)
+
+    def _steps(self, points: NDArray[np.float64], axis: int) -> NDArray[np.float64]:
+        """Whole numbers `(N,)` of `SCALE` along one axis; refuses what int32 cannot hold."""
+        steps: NDArray[np.float64] = points[:, axis] - self._header.offsets[axis]
+        steps /= SCALE
+        np.rint(steps, out=steps)
+        if len(steps) and max(steps.max(), -steps.min()) > np.iinfo(np.int32).max:
+            far = points[np.argmax(np.abs(steps))].round(1).tolist()
+            msg = (
+                f"a map point lies at {far} m, too far for a LAS file; the trajectory has diverged"
+            )
+            raise EstimationError(msg)
+        return steps
 
     def _finish(self) -> None:
         self._writer.close()

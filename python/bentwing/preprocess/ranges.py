@@ -25,5 +25,6 @@ def within_range(
     -------
     (N,) bool
     """
-    squared = np.einsum("ij,ij->i", points, points)
+    x, y, z = points.T
+    squared = x * x + y * y + z * z
     return np.asarray((squared >= min_range**2) & (squared <= max_range**2))

@@ -29,6 +29,8 @@ def outside_boxes(points: NDArray[np.float64], self_hits: Iterable[SelfHit]) -> 
     """
     outside = np.ones(len(points), dtype=np.bool_)
     for region in self_hits:
-        inside = (points >= region.box.min) & (points <= region.box.max)
-        outside &= ~inside.all(axis=1)
+        inside = np.ones(len(points), dtype=np.bool_)
+        for along, low, high in zip(points.T, region.box.min, region.box.max, strict=True):
+            inside &= (along >= low) & (along <= high)
+        outside &= ~inside
     return outside

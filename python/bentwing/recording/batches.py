@@ -4,11 +4,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
+
+import numpy as np
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
+
+_Scalar = TypeVar("_Scalar", bound=np.generic)
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,13 +36,13 @@ class LidarBatch:
 
     def where(self, keep: NDArray[np.bool_] | NDArray[np.intp] | slice) -> LidarBatch:
         """Return the returns selected by a mask, by indices or by a slice."""
-        intensity, ring, angles = self.intensity, self.ring, self.angles
+        chosen, intensity, ring, angles = numbered(keep), self.intensity, self.ring, self.angles
         return LidarBatch(
-            self.points[keep],
-            self.times[keep],
-            None if intensity is None else intensity[keep],
-            None if ring is None else ring[keep],
-            None if angles is None else angles[keep],
+            rows(self.points, chosen),
+            rows(self.times, chosen),
+            None if intensity is None else rows(intensity, chosen),
+            None if ring is None else rows(ring, chosen),
+            None if angles is None else rows(angles, chosen),
         )
 
 
@@ -78,3 +81,15 @@ class EncoderBatch:
 
 
 Batch = LidarBatch | ImuBatch | EncoderBatch
+
+
+def numbered(keep: NDArray[np.bool_] | NDArray[np.intp] | slice) -> NDArray[np.intp] | slice:
+    """Turn a mask into indices, once for all the fields it selects from."""
+    if isinstance(keep, slice):
+        return keep
+    return np.flatnonzero(keep) if keep.dtype == np.bool_ else keep.astype(np.intp, copy=False)
+
+
+def rows(values: NDArray[_Scalar], chosen: NDArray[np.intp] | slice) -> NDArray[_Scalar]:
+    """Rows of values `(N, ...)`; `take` is several times faster than an index or a mask."""
+    return values[chosen] if isinstance(chosen, slice) else values.take(chosen, axis=0)

@@ -62,38 +62,44 @@ def _points_of_run(
     scans: Sequence[RawScan], starts: NDArray[np.float64], counts: Counter[str]
 ) -> LidarBatch:
     head = scans[0]
-    ranges = np.stack([scan.ranges for scan in scans]).astype(np.float64)
+    shape = len(scans), len(head.ranges)
+    ranges = _joined([scan.ranges for scan in scans]).reshape(shape)
     keep = _valid(ranges, head.range_min, head.range_max, counts)
-    rays = _rays(head.angle_min, head.angle_increment, len(head.ranges))
-    times = starts[:, None] + np.arange(len(head.ranges)) * head.time_increment
-    distances = ranges[keep]
-    beams = np.broadcast_to(np.arange(len(head.ranges)), ranges.shape)[keep]
-    points = rays[beams] * distances[:, None]
+    # All beams are placed and the valid ones taken: that is cheaper than to find each one's angle.
+    distances = np.where(keep, ranges, 0).astype(np.float64)
+    cosines, sines = _directions(head.angle_min, head.angle_increment, shape[1])
+    points = np.zeros((*shape, 3))
+    np.multiply(cosines, distances, out=points[..., 0])
+    np.multiply(sines, distances, out=points[..., 1])
+    times = starts[:, None] + np.arange(shape[1]) * head.time_increment
     intensity = None
     if head.intensities is not None:
-        stacked = [scan.intensities for scan in scans if scan.intensities is not None]
-        intensity = np.stack(stacked).astype(np.float32)[keep]
-    return LidarBatch(points, times[keep], intensity)
+        intensity = _joined([s.intensities for s in scans if s.intensities is not None])
+    return LidarBatch(points.reshape(-1, 3), times.ravel(), intensity).where(keep.ravel())
 
 
 def _valid(
-    ranges: NDArray[np.float64], low: float, high: float, counts: Counter[str]
+    ranges: NDArray[np.float32], low: float, high: float, counts: Counter[str]
 ) -> NDArray[np.bool_]:
     """Return which ranges are returns, and count why the others are not."""
-    is_nan, is_inf, is_zero = np.isnan(ranges), np.isinf(ranges), ranges == 0.0
     # Some drivers leave the limits at zero; NaN limits compare false and keep nothing.
     within = (ranges >= low) & (ranges <= high) if high > 0 else ranges > 0
-    counts["returns"] += ranges.size
-    counts["nan"] += int(is_nan.sum())
-    counts["inf"] += int(is_inf.sum())
-    counts["zero"] += int(is_zero.sum())
-    keep = within & ~is_nan & ~is_inf & ~is_zero
-    counts["out_of_range"] += int((~keep & ~is_nan & ~is_inf & ~is_zero).sum())
+    keep = within & (ranges != 0) & np.isfinite(ranges)
+    masks = {"nan": np.isnan(ranges), "inf": np.isinf(ranges), "zero": ranges == 0}
+    unusable = {reason: int(np.count_nonzero(mask)) for reason, mask in masks.items()}
+    n_far = ranges.size - int(np.count_nonzero(keep)) - sum(unusable.values())
+    counts.update({"returns": ranges.size, **unusable, "out_of_range": n_far})
     return np.asarray(keep, dtype=np.bool_)
 
 
+def _joined(parts: Sequence[NDArray[np.float32]]) -> NDArray[np.float32]:
+    return np.concatenate(parts).astype(np.float32, copy=False)
+
+
 @functools.lru_cache(maxsize=8)
-def _rays(angle_min: float, increment: float, n: int) -> NDArray[np.float64]:
-    """(n, 3) unit vectors of the beams, lidar frame."""
+def _directions(
+    angle_min: float, increment: float, n: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Cosines and sines (n,) of the beams' angles in the scan plane."""
     angles = angle_min + np.arange(n) * increment
-    return np.column_stack([np.cos(angles), np.sin(angles), np.zeros(n)])
+    return np.cos(angles), np.sin(angles)

@@ -4,22 +4,26 @@
 from __future__ import annotations
 
 import heapq
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
-from rosbags.rosbag1 import Reader as Rosbag1Reader
-from rosbags.rosbag2 import Reader as Rosbag2Reader
-
 from bentwing.errors import RecordingError
+from bentwing.recording.bag_messages import bag_messages
 from bentwing.recording.bag_recovery import scan_bag
 from bentwing.recording.mcap_scan import scan_mcap
 from bentwing.recording.pcap_scan import check_pcap, scan_pcap
 from bentwing.recording.scanned import ScannedSource, TopicInfo
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator, Sequence
+    from collections.abc import Callable, Collection, Iterator, Sequence
 
     from rosbags.interfaces import Connection
+    from rosbags.rosbag1 import Reader as Rosbag1Reader
+    from rosbags.rosbag2 import Reader as Rosbag2Reader
+
+    # Of some connections from a time on: connection, recorder's time and bytes.
+    _Read = Callable[[Sequence[Connection], int | None], Iterator[tuple[Connection, int, bytes]]]
 
 PCAP_SUFFIXES = (".pcap", ".pcapng")
 SUFFIXES = (".bag", ".mcap", ".db3", *PCAP_SUFFIXES)
@@ -57,7 +61,9 @@ class RosbagsSource:
         # A ROS 2 folder may well be called something.bag.
         self.cdr = path.is_dir() or path.suffix != ".bag"
         self._path = path
-        self._reader = Rosbag2Reader(path) if self.cdr else Rosbag1Reader(path)
+        self._reader: Rosbag1Reader | Rosbag2Reader
+        self._read: _Read
+        self._reader, self._read = _ros2_reader(path) if self.cdr else _ros1_reader(path)
         self._reader.open()
         infos = self._reader.topics
         self.topics = tuple(
@@ -76,7 +82,7 @@ class RosbagsSource:
         if not connections:
             return
         stamp_ns = start_ns
-        stream = self._reader.messages(connections, start_ns)
+        stream = self._read(connections, start_ns)
         while True:
             try:
                 connection, stamp_ns, data = next(stream)
@@ -95,6 +101,20 @@ class RosbagsSource:
     def close(self) -> None:
         """Close the files."""
         self._reader.close()
+
+
+def _ros1_reader(path: Path) -> tuple[Rosbag1Reader, _Read]:
+    from rosbags.rosbag1 import Reader
+
+    reader = Reader(path)
+    return reader, partial(bag_messages, reader)
+
+
+def _ros2_reader(path: Path) -> tuple[Rosbag2Reader, _Read]:
+    from rosbags.rosbag2 import Reader  # slow to import, and no ROS 1 bag needs it
+
+    reader = Reader(path)
+    return reader, reader.messages
 
 
 class MergedSource:

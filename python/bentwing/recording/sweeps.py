@@ -37,7 +37,7 @@ class SweepMerger:
         # Sweeps to come begin no earlier than the newest of these, which all devices keep.
         newest = float(sweeps[-1].times.min())
         held = [] if self._held is None else [self._held]
-        merged = self._without_late(_sorted(_concatenated([*held, *sweeps])))
+        merged = self._without_late(_merged([*held, *sweeps]))
         if not len(merged.times):
             return None
         limit = max(newest, float(merged.times[-1]) - MAX_HELD)
@@ -62,10 +62,24 @@ class SweepMerger:
         return batch.where(slice(n_late, None)) if n_late else batch
 
 
-def _sorted(batch: LidarBatch) -> LidarBatch:
-    if np.all(np.diff(batch.times) >= 0):
-        return batch
-    return batch.where(np.argsort(batch.times, kind="stable"))
+def _merged(batches: Sequence[LidarBatch]) -> LidarBatch:
+    """Join sweeps in time order; of equal times the earlier sweep's come first."""
+    joined = _concatenated(batches)
+    drops = np.flatnonzero(joined.times[1:] < joined.times[:-1])
+    if not len(drops):
+        return joined
+    if len(batches) == 1:
+        return joined.where(np.argsort(joined.times, kind="stable"))
+    # Sweeps overlap at their ends: what lies before and after that is in order, and stays.
+    before, after = np.split(joined.times, [drops[0] + 1])
+    begin = int(np.searchsorted(before, after.min(), side="right"))
+    before, after = np.split(joined.times, [drops[-1] + 1])
+    end = len(before) + int(np.searchsorted(after, before.max(), side="left"))
+    order = begin + np.argsort(joined.times[begin:end], kind="stable")
+    for field in (joined.points, joined.times, joined.intensity, joined.ring):
+        if field is not None:
+            field[begin:end] = field[order]
+    return joined
 
 
 def _concatenated(batches: Sequence[LidarBatch]) -> LidarBatch:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,14 +21,21 @@ TIME = (
 )  # fmt: skip
 
 
-def colour(values: NDArray[np.float64], table: tuple[str, ...]) -> NDArray[np.float64]:
+_SHADES = 1024  # of a colour map; neighbours differ by less than one of 256 levels
+
+
+def colour(values: NDArray[np.float64], table: tuple[str, ...]) -> NDArray[np.float32]:
     """Colours `(N, 3)`, 0 to 255, of values `(N,)` between 0 and 1."""
+    at = np.clip(np.nan_to_num(values), 0, 1) * (_SHADES - 1)
+    return _shades(table).take(np.rint(at).astype(np.intp), axis=0)
+
+
+@lru_cache
+def _shades(table: tuple[str, ...]) -> NDArray[np.float32]:
+    """Colours `(_SHADES, 3)` from one end of a table to the other."""
     anchors = np.array([[int(code[i : i + 2], 16) for i in (0, 2, 4)] for code in table], float)
-    at = np.clip(np.nan_to_num(values), 0, 1) * (len(anchors) - 1)
-    below = np.minimum(at.astype(np.int64), len(anchors) - 2)
-    share = (at - below)[:, None]
-    mixed: NDArray[np.float64] = anchors[below] * (1 - share) + anchors[below + 1] * share
-    return mixed
+    at, places = np.linspace(0, 1, _SHADES), np.linspace(0, 1, len(table))
+    return np.stack([np.interp(at, places, c) for c in anchors.T], axis=1).astype(np.float32)
 
 
 def gradient(table: tuple[str, ...]) -> list[str]:

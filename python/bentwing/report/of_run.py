@@ -28,4 +28,5 @@ def report_run(folder: RunFolder, run: Run, *, complete: bool) -> None:
     )
     if len(points):
         overhead = overhead_points(points, times, run.trajectory)
-        write_png(folder.file("map_top.png"), render_top(points[~overhead]))
+        seen = points[~overhead] if overhead.any() else points
+        write_png(folder.file("map_top.png"), render_top(seen))

@@ -25,6 +25,8 @@ _ENCLOSED = 3  # filled neighbours of eight
 _RADII = (1, 3)  # pixels over which depth is compared
 _OUTLIERS = 0.1  # percent of the points on each side that may fall off the picture
 _SLACK = 0.25  # of the extent without outliers that they may add on each side
+_EFFORT = 1  # of zlib; higher levels take twice the time and save no hundredth of the size
+_THINNED = 100_000  # points that are enough for a percentile
 _NEIGHBOURS = ((0, 1), (1, 0), (0, -1), (-1, 0), (1, 1), (1, -1), (-1, 1), (-1, -1))
 
 
@@ -48,6 +50,24 @@ class View:
     high: float
 
 
+@dataclass(frozen=True, slots=True)
+class Projection:
+    """What is seen of a cloud along one direction, before it is coloured.
+
+    Attributes
+    ----------
+    front : (H, W) intp, index of the point nearest to the viewer, -1 where there is none
+    light : (H, W) float32, brightness, see `_eye_dome`
+    pixel, left, top : as of a `View`
+    """
+
+    front: NDArray[np.intp]
+    light: NDArray[np.float32]
+    pixel: float
+    left: float
+    top: float
+
+
 def render(
     across: NDArray[np.float64],
     up: NDArray[np.float64],
@@ -60,34 +80,66 @@ def render(
     shading: float = 1.0,
     close_gaps: int = 3,
 ) -> View:
-    """Draw points as seen from far away along one direction.
+    """Draw points as seen from far away along one direction; see `project` and `paint`."""
+    seen = project(across, up, toward, width=width, max_height=max_height, close_gaps=close_gaps)
+    return paint(seen, values, table=table, shading=shading)
+
+
+def project(
+    across: NDArray[np.float64],
+    up: NDArray[np.float64],
+    toward: NDArray[np.float64],
+    *,
+    width: int = 1100,
+    max_height: int = 900,
+    close_gaps: int = 3,
+) -> Projection:
+    """Find what is seen of points from far away along one direction.
 
     Parameters
     ----------
     across, up, toward : (N,) m, coordinates to the right, upwards and to the viewer
-    values : (N,) what the colour shows; its central 98 % span the colour map
     width, max_height : pixels; the picture gets smaller pixels only as far as both allow
-    table : colour map
-    shading : 0 for flat colours, 1 for full eye-dome lighting
     close_gaps : pixels by which gaps are filled from their edges; it thickens lines as well
     """
     left, right, bottom, top = _frame(across, up)
     pixel = max((right - left) / width, (top - bottom) / max_height, 1e-3)
     shape = (max(int((top - bottom) / pixel), 1) + 1, max(int((right - left) / pixel), 1) + 1)
-    low, high = np.percentile(values, [1, 99]) if len(values) else (0.0, 1.0)
     front = _front_points(((top - up) / pixel, (across - left) / pixel), toward, shape)
-    depth = np.full(shape, -np.inf)
-    shade = np.full(shape, np.nan)
+    depth = np.full(shape, -np.inf, np.float32)
     seen = front >= 0
-    depth[seen] = toward[front[seen]]
-    shade[seen] = (values[front[seen]] - low) / max(high - low, 1e-9)
+    nearest = toward[front[seen]]
+    # single precision is far below a pixel once the depths are relative to each other
+    depth[seen] = (nearest - nearest[:1]) / pixel
     for _ in range(close_gaps):
-        _close_gaps(depth, shade)
-    light = 1 - shading * (1 - _eye_dome(depth, pixel))
-    image = np.full((*shape, 3), PAPER, np.uint8)
-    seen = np.isfinite(depth)
-    image[seen] = colour(shade[seen], table) * light[seen][:, None]
-    return View(image, pixel, left, top, float(low), float(high))
+        _close_gaps(depth, front)
+    return Projection(front, _eye_dome(depth), pixel, left, top)
+
+
+def paint(
+    seen: Projection,
+    values: NDArray[np.float64],
+    *,
+    table: tuple[str, ...] = HEIGHT,
+    shading: float = 1.0,
+) -> View:
+    """Colour what is seen.
+
+    Parameters
+    ----------
+    seen : the projection of N points
+    values : (N,) what the colour shows; its central 98 % span the colour map
+    table : colour map
+    shading : 0 for flat colours, 1 for full eye-dome lighting
+    """
+    low, high = np.percentile(thinned(values), [1, 99]) if len(values) else (0.0, 1.0)
+    filled = np.flatnonzero(seen.front >= 0)
+    shade = (values[seen.front.ravel()[filled]] - low) / max(high - low, 1e-9)
+    light = 1 - shading * (1 - seen.light.ravel()[filled])
+    image = np.full((seen.front.size, 3), PAPER, np.uint8)
+    image[filled] = colour(shade, table) * light[:, None]
+    image = image.reshape(*seen.front.shape, 3)
+    return View(image, seen.pixel, seen.left, seen.top, float(low), float(high))
 
 
 def render_top(
@@ -125,7 +177,7 @@ def encode_png(image: NDArray[np.uint8]) -> bytes:
     rows[:, 0] = 2
     rows[:, 1:] = (image - above).reshape(height, -1)
     header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
-    chunks = ((b"IHDR", header), (b"IDAT", zlib.compress(rows.tobytes(), 7)), (b"IEND", b""))
+    chunks = ((b"IHDR", header), (b"IDAT", zlib.compress(rows.data, _EFFORT)), (b"IEND", b""))
     return b"\x89PNG\r\n\x1a\n" + b"".join(_png_chunk(kind, data) for kind, data in chunks)
 
 
@@ -151,56 +203,80 @@ def _frame(
 
 
 def _extent(values: NDArray[np.float64]) -> tuple[float, float]:
-    low, high = np.percentile(values, [_OUTLIERS, 100 - _OUTLIERS])
+    low, high = np.percentile(thinned(values), [_OUTLIERS, 100 - _OUTLIERS])
     # a far wall has few points, but is not far outside of the rest
     slack = _SLACK * (high - low)
     return float(max(low - slack, values.min())), float(min(high + slack, values.max()))
+
+
+def thinned(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Every k-th of values `(N, ...)`, k odd so as not to keep step with the beams of a lidar."""
+    return values[:: len(values) // _THINNED | 1]
 
 
 def _front_points(
     place: tuple[NDArray[np.float64], NDArray[np.float64]],
     toward: NDArray[np.float64],
     shape: tuple[int, int],
-) -> NDArray[np.int64]:
+) -> NDArray[np.intp]:
     """Index of the point nearest to the viewer in every pixel, -1 where there is none."""
-    row, column = (np.floor(coordinate).astype(np.int64) for coordinate in place)
-    inside = (row >= 0) & (row < shape[0]) & (column >= 0) & (column < shape[1])
-    order = np.argsort(toward, kind="stable")
-    order = order[inside[order]]
-    front = np.full(shape, -1, np.int64)
-    front[row[order], column[order]] = order  # of repeated places the last is kept: the nearest
-    return front
+    row, column = place
+    outside = shape[0] * shape[1]  # a cell of its own behind the picture, left out at the end
+    is_inside = (row >= 0) & (row < shape[0]) & (column >= 0) & (column < shape[1])
+    pixel = row.astype(np.intp) * shape[1] + column.astype(np.intp)
+    pixel[~is_inside] = outside
+    nearest = np.full(outside + 1, -np.inf)
+    np.maximum.at(nearest, pixel, toward)
+    index = np.flatnonzero(toward == nearest[pixel])
+    front = np.full(outside + 1, -1, np.intp)
+    front[pixel[index]] = index
+    return front[:-1].reshape(shape)
 
 
-def _close_gaps(depth: NDArray[np.float64], shade: NDArray[np.float64]) -> None:
+def _close_gaps(depth: NDArray[np.float32], front: NDArray[np.intp]) -> None:
     """Give empty pixels enclosed by filled ones the nearest of their neighbours."""
     around = np.pad(depth, 1, constant_values=-np.inf)
-    filled = np.isfinite(around).astype(np.uint8)
+    filled = np.isfinite(around).view(np.uint8)
     n_filled = sum(_moved(filled, step, 1) for step in _NEIGHBOURS)
-    row, column = np.nonzero(~np.isfinite(depth) & (n_filled >= _ENCLOSED))
-    steps = np.array(_NEIGHBOURS)
-    rows, columns = row + steps[:, :1], column + steps[:, 1:]  # (8, K)
-    nearest = np.argmax(around[rows + 1, columns + 1], axis=0)[None]
-    chosen = np.take_along_axis(rows, nearest, 0)[0], np.take_along_axis(columns, nearest, 0)[0]
-    depth[row, column], shade[row, column] = depth[chosen], shade[chosen]
+    empty = np.flatnonzero((front < 0) & (n_filled >= _ENCLOSED))
+    row, column = np.divmod(empty, depth.shape[1])
+    depths = around.ravel()
+    nearest, source = np.full(len(empty), -np.inf, np.float32), empty.copy()
+    for down, right in _NEIGHBOURS:
+        neighbour = depths.take((row + 1 + down) * around.shape[1] + column + 1 + right)
+        is_nearer = neighbour > nearest
+        np.copyto(nearest, neighbour, where=is_nearer)
+        np.copyto(source, empty + (down * depth.shape[1] + right), where=is_nearer)
+    depth.ravel()[empty], front.ravel()[empty] = nearest, front.ravel()[source]
 
 
-def _eye_dome(depth: NDArray[np.float64], pixel: float) -> NDArray[np.float64]:
+def _eye_dome(depth: NDArray[np.float32]) -> NDArray[np.float32]:
     """Brightness 0.3 to 1: dark where neighbouring pixels are nearer to the viewer.
+
+    Parameters
+    ----------
+    depth : (H, W), pixels towards the viewer, minus infinity where nothing is
 
     References
     ----------
     Boucheny 2009, eye-dome lighting, here with two radii and no light direction.
     """
-    floor = np.where(np.isfinite(depth), depth, np.inf)  # what is empty is behind nothing
+    floor = np.where(
+        np.isfinite(depth), depth, np.float32(np.inf)
+    )  # what is empty is behind nothing
     around = np.pad(depth, max(_RADII), constant_values=-np.inf)
     hidden = np.zeros_like(depth)
+    nearer = np.empty_like(depth)
     for radius in _RADII:
         for step in _NEIGHBOURS:
-            nearer = _moved(around, (radius * step[0], radius * step[1]), max(_RADII)) - floor
-            nearer /= radius * pixel
+            neighbour = _moved(around, (radius * step[0], radius * step[1]), max(_RADII))
+            np.subtract(neighbour, floor, out=nearer)
+            nearer *= np.float32(1 / radius)
             hidden += np.clip(nearer, 0, 4.0, out=nearer)
-    return 0.3 + 0.7 * np.exp(-hidden / 16.0)
+    light: NDArray[np.float32] = np.exp(hidden / np.float32(-16.0))
+    light *= np.float32(0.7)
+    light += np.float32(0.3)
+    return light
 
 
 def _moved(padded: NDArray[_Scalar], step: tuple[int, int], margin: int) -> NDArray[_Scalar]:

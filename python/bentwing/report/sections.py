@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bentwing.report.picture import thinned
+
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
@@ -67,7 +69,7 @@ def tiles(record: Mapping[str, Any], trajectory: Trajectory, points: NDArray[np.
     if "map.points" in counts:
         facts.append((_amount(counts["map.points"]), "points in the map"))
     if len(points):
-        size = np.subtract(*np.percentile(points, [99.8, 0.2], axis=0))
+        size = np.subtract(*np.percentile(thinned(points), [99.8, 0.2], axis=0))
         facts.append((f" {TIMES} ".join(f"{s:.0f}" for s in size) + " m", "extent"))
     if record.get("peak_memory_mb"):
         facts.append((f"{record['peak_memory_mb'] / 1000:.1f} GB", "peak memory"))

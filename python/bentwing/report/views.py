@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bentwing.report.colours import HEIGHT, TIME
-from bentwing.report.picture import render
+from bentwing.report.picture import paint, project, render
 from bentwing.report.svg import map_view
 
 if TYPE_CHECKING:
@@ -51,8 +51,9 @@ def draw_views(
     path = trajectory.positions
     plan, plan_times = points[~overhead], times[~overhead]
     x, y, z = plan.T
-    by_height = render(x, y, z, z, width=800, max_height=800)
-    by_time = render(x, y, z, plan_times, width=800, max_height=800, table=TIME, shading=0.5)
+    from_above = project(x, y, z, width=800, max_height=800)
+    by_height = paint(from_above, z)
+    by_time = paint(from_above, plan_times, table=TIME, shading=0.5)
     centre = np.median(path, axis=0) if len(path) else np.zeros(3)
     slab = np.abs((points - centre) @ beside) < SLAB / 2
     note = "Points above the sensor are left out, so that the roof does not hide the floor."
@@ -77,14 +78,17 @@ def overhead_points(
     """
     if not len(points) or not len(trajectory.times):
         return np.zeros(len(points), np.bool_)
-    inside = np.clip(times, trajectory.times[0], trajectory.times[-1])
-    from_sensor = points - trajectory.interpolate(inside)[0]
-    above: NDArray[np.bool_] = from_sensor[:, 2] > _HEADROOM
-    near = np.hypot(from_sensor[:, 0], from_sensor[:, 1]) < _NEAR
-    seconds = np.floor(times)
-    n_roofed = len(np.unique(seconds[above & near]))
-    roofed = n_roofed > _ROOFED_SHARE * len(np.unique(seconds))
+    above: NDArray[np.bool_] = points[:, 2] - _followed(trajectory, times, 2) > _HEADROOM
+    high, when = points[above], times[above]
+    beside = [high[:, axis] - _followed(trajectory, when, axis) for axis in range(2)]
+    seconds = np.floor(when[np.hypot(*beside) < _NEAR])
+    roofed = len(np.unique(seconds)) > _ROOFED_SHARE * len(np.unique(np.floor(times)))
     return above if roofed else np.zeros(len(points), np.bool_)
+
+
+def _followed(trajectory: Trajectory, times: NDArray[np.float64], axis: int) -> NDArray[np.float64]:
+    """One coordinate `(N,)` of the sensor at any times, held beyond the trajectory's ends."""
+    return np.interp(times, trajectory.times, trajectory.positions[:, axis])
 
 
 def _oblique(

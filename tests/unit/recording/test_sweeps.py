@@ -32,6 +32,26 @@ def test_sweeps_that_overlap_are_merged_without_loss():
     assert counts["late_points"] == 0
 
 
+def test_where_sweeps_overlap_only_the_order_of_equal_times_tells_them_apart():
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        ends = np.cumsum(rng.uniform(0, 0.04, 4))
+        times = [np.sort(rng.integers(0, 9, 30) * 0.01 + end) for end in ends]
+        numbers = np.arange(120.0).reshape(4, 30)
+        sweeps = [
+            LidarBatch(np.column_stack([n, n, n]), t, n.astype(np.float32))
+            for n, t in zip(numbers, times, strict=True)
+        ]
+        merger = SweepMerger(Counter())
+        parts = [merger.push(sweeps), merger.finish()]
+        points = np.concatenate([part.points for part in parts if part is not None])
+        intensity = np.concatenate([part.intensity for part in parts if part is not None])
+        np.testing.assert_array_equal(
+            points[:, 0], np.argsort(np.concatenate(times), kind="stable")
+        )
+        np.testing.assert_array_equal(points[:, 0], intensity)
+
+
 def test_points_before_what_was_handed_out_are_counted():
     times, counts = merged([sweep([0.0, 0.1]), sweep([0.2, 0.3]), sweep([0.0, 0.31, 0.4])])
     assert counts["late_points"] == 1

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bentwing.report.colours import HEIGHT, colour
-from bentwing.report.picture import encode_png, render, render_top, write_png
+from bentwing.report.picture import encode_png, project, render, render_top, write_png
 from bentwing.report.plot import Series, line_plot
 from bentwing.report.svg import nice_ticks
 from bentwing.report.views import overhead_points
@@ -42,6 +42,23 @@ def test_the_point_nearest_to_the_viewer_is_seen():
     view = render(x, x, np.array([1.0, 5.0]), np.array([0.0, 1.0]), close_gaps=0, shading=0.0)
     seen = view.image[(view.image < 255).any(axis=2)]
     assert np.array_equal(seen, colour(np.array([1.0]), HEIGHT).astype(np.uint8))
+
+
+def test_every_pixel_has_the_nearest_of_its_points_and_of_equals_the_last():
+    rng = np.random.default_rng(1)
+    across, up = rng.uniform(0, 1, (2, 2000))
+    across[0] = 1e9  # falls off the picture
+    toward = rng.integers(0, 5, 2000).astype(float)
+    seen = project(across, up, toward, width=20, max_height=20, close_gaps=0)
+    expected = np.full_like(seen.front, -1)
+    for i in np.argsort(toward, kind="stable"):
+        row, column = (
+            int((seen.top - up[i]) / seen.pixel),
+            int((across[i] - seen.left) / seen.pixel),
+        )
+        if max(row, column) < 21:
+            expected[row, column] = i
+    assert np.array_equal(seen.front, expected)
 
 
 def test_metres_in_the_picture_are_metres_in_the_map():

@@ -106,5 +106,6 @@ def joined(segments: Sequence[Segment], dt: float) -> Trajectory:
         np.concatenate([s.quats_xyzw for s in segments]),
     )
     first, last = segments[0].times[0], segments[-1].times[-1]
-    times = np.minimum(first + dt * np.arange(round((last - first) / dt) + 1), last)
+    n = int((last - first) / dt + 1e-6) + 1
+    times = np.minimum(first + dt * np.arange(n), last)
     return Trajectory(times, *poses.interpolate(times))

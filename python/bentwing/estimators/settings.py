@@ -20,7 +20,7 @@ class SurfelSettings(_Section):
     max_gap: float = Field(0.08, gt=0, description="a longer pause splits a cell, s")
     max_span: float = Field(0.3, gt=0, description="longest time in a surfel, s")
     min_points: int = Field(6, ge=4)
-    min_planarity: float = Field(0.5, ge=0, le=1, description="2 (l2 - l1) / (l1 + l2 + l3)")
+    min_planarity: float = Field(0.3, ge=0, le=1, description="2 (l2 - l1) / (l1 + l2 + l3)")
     min_width_ratio: float = Field(0.03, ge=0, le=1, description="l2 / l3")
     min_width: float = Field(
         0.05, ge=0, description="sqrt(l2) in voxels; rejects single scan lines"

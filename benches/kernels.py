@@ -31,8 +31,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-    os.environ[variable] = "1"  # before any of them is loaded
+# Before any of them is loaded.
+os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1")
 
 import numpy as np
 
@@ -117,9 +117,7 @@ Found = tuple[np.ndarray, np.ndarray]
 
 def trees() -> dict[str, Callable[[np.ndarray, int], Found]]:
     """Searches of a table in itself, by the name of the package."""
-    kdtree, nanoflann, spatial = map(
-        installed, ("pykdtree.kdtree", "pynanoflann", "scipy.spatial")
-    )
+    kdtree, nanoflann, spatial = map(installed, ("pykdtree.kdtree", "pynanoflann", "scipy.spatial"))
     found: dict[str, Callable[[np.ndarray, int], Found]] = {}
     if kdtree is not None:
         found["pykdtree"] = lambda table, k: kdtree.KDTree(table).query(
@@ -207,9 +205,16 @@ def surfels(ours: Ours, folder: Path, name: str, repeats: int) -> None:
 def solve(ours: Ours, folder: Path, name: str, repeats: int) -> None:
     load = lambda file: np.load(folder / f"{file}.npy")  # noqa: E731
     right, x = load("right"), load("solution")
-    works = {"bentwing": partial(ours.run, name), "bentwing, anew": partial(ours.run, f"{name}/anew")}
+    works = {
+        "bentwing": partial(ours.run, name),
+        "bentwing, anew": partial(ours.run, f"{name}/anew"),
+    }
     variants = (f"{name}/dense", f"{name}/sparse")
-    works |= {f"bentwing, {v.rsplit('/', 1)[1]}": partial(ours.run, v) for v in variants if v in ours.cases}
+    works |= {
+        f"bentwing, {v.rsplit('/', 1)[1]}": partial(ours.run, v)
+        for v in variants
+        if v in ours.cases
+    }
     cholmod, sparse = installed("sksparse.cholmod"), installed("scipy.sparse")
     if cholmod is not None and sparse is not None:
         n = len(right)

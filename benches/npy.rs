@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Arrays as NumPy reads them from a file (format 1.0).
+//! Arrays as `NumPy` reads them from a file (format 1.0).
 
 use std::fs;
 use std::io;
 use std::path::Path;
 
-/// A number that NumPy knows.
+/// A number that `NumPy` knows.
 pub trait Number: Copy {
     /// Its name in the header.
     const DESCRIPTION: &'static str;

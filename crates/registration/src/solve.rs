@@ -15,9 +15,9 @@ use dense::DenseLlt;
 use layout::Layout;
 use sparse::Pattern;
 
-/// Above this number of unknowns the sparse factorization is faster (measured in
-/// `benches/registration.rs`).
-const DENSE_LIMIT: usize = 700;
+/// Up to this number of unknowns the dense factorization of a window is at least about as fast, for
+/// nearly all of its blocks are there (measured with `benches/kernels.py solve/window`).
+const DENSE_LIMIT: usize = 1250;
 
 /// Why the normal equations have no solution.
 #[derive(Debug, Error, PartialEq)]

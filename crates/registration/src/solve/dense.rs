@@ -2,9 +2,11 @@
 //! The dense matrix of the normal equations, factorized where it stands.
 
 use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::cholesky::llt::factor::{cholesky_in_place, cholesky_in_place_scratch};
+use faer::linalg::cholesky::llt::factor::{
+    LltRegularization, cholesky_in_place, cholesky_in_place_scratch,
+};
 use faer::linalg::cholesky::llt::solve::solve_in_place;
-use faer::{Mat, Par};
+use faer::{Mat, Par, Spec};
 
 use super::layout::Layout;
 use super::{SolveError, singular};
@@ -16,13 +18,13 @@ pub(super) struct DenseLlt(Mat<f64>);
 impl DenseLlt {
     pub(super) fn new(equations: &NormalEquations, layout: &Layout) -> Result<Self, SolveError> {
         let mut matrix = assemble(equations, layout);
-        let scratch = cholesky_in_place_scratch::<f64>(layout.len(), Par::Seq, Default::default());
+        let scratch = cholesky_in_place_scratch::<f64>(layout.len(), Par::Seq, Spec::default());
         let factorized = cholesky_in_place(
             matrix.as_mut(),
-            Default::default(),
+            LltRegularization::default(),
             Par::Seq,
             MemStack::new(&mut MemBuffer::new(scratch)),
-            Default::default(),
+            Spec::default(),
         );
         match factorized {
             Ok(_) => Ok(Self(matrix)),
@@ -51,11 +53,10 @@ fn assemble(equations: &NormalEquations, layout: &Layout) -> Mat<f64> {
     let first = layout.n_knot_unknowns();
     for control in layout.n_clamped..layout.n_controls {
         let arrow = equations.arrow(control);
-        for j in 0..6 {
-            let column = 6 * (control - layout.n_clamped) + j;
-            let entries = &mut matrix.col_as_slice_mut(column)[first..];
-            for (entry, &g) in entries.iter_mut().zip(&layout.active) {
-                *entry = arrow[g][j];
+        let c = 6 * (control - layout.n_clamped);
+        for (i, &g) in layout.active.iter().enumerate() {
+            for (j, &entry) in arrow[g].iter().enumerate() {
+                matrix[(first + i, c + j)] = entry;
             }
         }
     }

@@ -2,7 +2,11 @@
 //! Data for the benches, made from a fixed seed: scanners that fly through a hall with pillars.
 #![forbid(unsafe_code)]
 
+mod chain;
+mod features;
 mod hall;
+pub mod npy;
+mod window;
 
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
@@ -10,6 +14,10 @@ use std::sync::Arc;
 use bentwing_registration::{Globals, ImuNoise, Settings as Registration};
 use bentwing_surfels::{Points, Settings as Surfels, SurfelSet};
 use bentwing_trajectory::{Head, Imu, Trajectory, so3};
+pub use chain::chain;
+pub use features::Features;
+pub use window::prior;
+
 use nalgebra::{Isometry3, Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 /// Interval of the trajectory's samples, s.

@@ -2,7 +2,7 @@
 //! Search of the surfels of a window among themselves, level by level.
 #![allow(missing_docs, reason = "criterion's macros make public items")]
 
-use bentwing_benches::{Flight, Scanner};
+use bentwing_benches::{Features, Scanner};
 use bentwing_neighbors::{Grid, Search, mutual_pairs};
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 
@@ -12,34 +12,19 @@ const SEARCH: Search = Search {
     min_time_gap: 0.3,
 };
 
-/// Positions in voxels and normals in the map, and times.
-type Features = (Vec<[f32; 3]>, Vec<[f32; 3]>, Vec<f64>);
-
-fn features(flight: &Flight, level: usize) -> Features {
-    let mut features = Features::default();
-    for set in flight.surfels() {
-        let size = set.voxel_sizes[level];
-        for i in set.level(level) {
-            let pose = flight.trajectory.pose(set.stamps[i]);
-            let (R_imu_lidar, t_imu_lidar) = flight.globals.head.lidar_in_imu(0.0);
-            let mean = pose.p + pose.R * (R_imu_lidar * set.means[i] + t_imu_lidar);
-            features.0.push((mean / size).cast::<f32>().into());
-            let normal = pose.R * (R_imu_lidar * set.normals[i]);
-            features.1.push(normal.cast::<f32>().into());
-            features.2.push(set.stamps[i]);
-        }
-    }
-    features
-}
-
 fn search(c: &mut Criterion) {
     let pool = bentwing_benches::one_thread();
     let mut group = c.benchmark_group("neighbors");
     for (name, scanner) in [("hokuyo_5s", Scanner::Hokuyo), ("vlp16_5s", Scanner::Vlp16)] {
         let flight = scanner.fly(5.0);
         for level in [0, 2] {
-            let (positions, normals, times) = features(&flight, level);
-            let build = || Grid::new(&positions, &normals, &times, 1.0);
+            let features = Features::of(&flight, level);
+            let Features {
+                positions,
+                normals,
+                times,
+            } = &features;
+            let build = || Grid::new(positions, normals, times, 1.0);
             let grid = build();
             group.throughput(Throughput::Elements(grid.len() as u64));
             group.bench_function(format!("{name}/level_{level}/build"), |b| {

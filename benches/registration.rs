@@ -2,48 +2,13 @@
 //! Registration of a window, its parts, and the crossover of dense and sparse solution.
 #![allow(missing_docs, reason = "criterion's macros make public items")]
 
-use bentwing_benches::{Flight, Scanner, one_thread};
+use bentwing_benches::{Scanner, one_thread, prior};
 use bentwing_registration::{
-    FixedView, GlobalMatrix, GlobalPrior, Initial, N_GLOBALS, NormalEquations, Problem, Settings,
-    Solver, first_equations, register_window,
+    FixedView, Initial, N_GLOBALS, Problem, Settings, Solver, register_window,
 };
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 
 const WINDOW: f64 = 5.0; // s
-
-/// A head without motor: the last five states do not exist.
-fn prior() -> GlobalPrior {
-    GlobalPrior {
-        information: GlobalMatrix::from_diagonal_element(1e5),
-        offset: [0.0; N_GLOBALS],
-        frozen: std::array::from_fn(|g| g >= N_GLOBALS - 5),
-    }
-}
-
-/// Runs `work` on the problem of a whole flight.
-fn with_problem<T>(
-    flight: &Flight,
-    views: &[&FixedView],
-    work: impl Fn(Problem<'_>, &Settings) -> T,
-) -> T {
-    let (sets, prior) = (flight.surfels(), prior());
-    let problem = Problem {
-        trajectory: flight.trajectory.clone(),
-        sets: &sets,
-        views,
-        imu: Some(&flight.imu),
-        globals: flight.globals.clone(),
-        prior: &prior,
-        initial: Initial::Clamped,
-    };
-    work(problem, &flight.settings())
-}
-
-fn equations(flight: &Flight) -> NormalEquations {
-    with_problem(flight, &[], |problem, settings| {
-        first_equations(&problem, settings)
-    })
-}
 
 /// One outer iteration with one solution and with three, whose difference is what two accumulations
 /// of the normal equations with their solutions cost; and everything until it converges.
@@ -89,7 +54,7 @@ fn solution(c: &mut Criterion) {
     group.sample_size(10);
     let frozen = prior().frozen;
     for seconds in [5.0, 10.0, 20.0, 40.0] {
-        let equations = equations(&Scanner::Hokuyo.fly(seconds));
+        let equations = Scanner::Hokuyo.fly(seconds).equations();
         let n_unknowns = 6 * (equations.n_controls() - 3) + N_GLOBALS - 5;
         for (name, limit) in [("dense", usize::MAX), ("sparse", 0)] {
             let mut solver = Solver::default();

@@ -3,6 +3,9 @@
 
 use std::ops::Range;
 
+/// Features whose distances are computed together.
+pub(crate) const LANES: usize = 16;
+
 const BITS: u32 = 21;
 const OFFSET: i64 = 1 << (BITS - 1);
 const MASK: u64 = (1 << BITS) - 1;
@@ -20,7 +23,7 @@ pub struct Grid {
     /// Original index of each sorted feature.
     order: Vec<u32>,
     cell_size: f32,
-    /// Position (x, y, z), normal and time of each sorted feature.
+    /// Position (x, y, z), normal and time of each sorted feature, and `LANES - 1` that are far away.
     columns: [Vec<f32>; 6],
     times: Vec<f32>,
 }
@@ -49,16 +52,15 @@ impl Grid {
         }
         cell_starts.push(keyed.len() as u32);
         let order: Vec<u32> = keyed.iter().map(|&(_, i)| i).collect();
-        let gather = |f: &dyn Fn(usize) -> f32| order.iter().map(|&i| f(i as usize)).collect();
         let columns = [
-            gather(&|i| positions[i][0]),
-            gather(&|i| positions[i][1]),
-            gather(&|i| positions[i][2]),
-            gather(&|i| normals[i][0]),
-            gather(&|i| normals[i][1]),
-            gather(&|i| normals[i][2]),
+            gather(&order, |i| positions[i][0]),
+            gather(&order, |i| positions[i][1]),
+            gather(&order, |i| positions[i][2]),
+            gather(&order, |i| normals[i][0]),
+            gather(&order, |i| normals[i][1]),
+            gather(&order, |i| normals[i][2]),
         ];
-        let times = gather(&|i| times[i] as f32);
+        let times = gather(&order, |i| times[i] as f32);
         Self {
             cell_keys,
             cell_starts,
@@ -104,12 +106,19 @@ impl Grid {
         (std::array::from_fn(|d| self.columns[d][s]), self.times[s])
     }
 
-    /// The six columns and the times of a run of sorted features.
-    pub(crate) fn run(&self, run: Range<usize>) -> ([&[f32]; 6], &[f32]) {
-        (
-            std::array::from_fn(|d| &self.columns[d][run.clone()]),
-            &self.times[run],
-        )
+    /// The six numbers and the times of `LANES` sorted features from `first` on.
+    #[inline]
+    pub(crate) fn block(&self, first: usize) -> Option<([&[f32; LANES]; 6], &[f32; LANES])> {
+        let [a, b, c, d, e, f] = &self.columns;
+        let columns = [
+            a.get(first..)?.first_chunk()?,
+            b.get(first..)?.first_chunk()?,
+            c.get(first..)?.first_chunk()?,
+            d.get(first..)?.first_chunk()?,
+            e.get(first..)?.first_chunk()?,
+            f.get(first..)?.first_chunk()?,
+        ];
+        Some((columns, self.times.get(first..)?.first_chunk()?))
     }
 
     /// The nine columns of three cells around the cell with `key`, the middle one first.
@@ -171,6 +180,12 @@ impl Column {
         });
         squares.sum()
     }
+}
+
+/// Values in sorted order, and so many more that a block can begin at the last one.
+fn gather(order: &[u32], value: impl Fn(usize) -> f32) -> Vec<f32> {
+    let sorted = order.iter().map(|&i| value(i as usize));
+    sorted.chain([f32::INFINITY; LANES - 1]).collect()
 }
 
 fn key_of(p: &[f32; 3], cell_size: f32) -> u64 {

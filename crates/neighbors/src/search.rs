@@ -12,12 +12,10 @@ use pulp::Arch;
 use rayon::prelude::*;
 
 use crate::Grid;
+use crate::grid::LANES;
 
 /// Marks an empty place in a list of neighbours.
 pub const NONE: u32 = u32::MAX;
-
-/// Candidates whose distances are computed together.
-const LANES: usize = 16;
 
 /// Query cells per parallel task.
 const CELLS_PER_TASK: usize = 64;
@@ -143,52 +141,29 @@ impl Grid {
         search: &Search,
         best: &mut Best,
     ) {
-        let (columns, times) = self.run(run.clone());
-        for first in (0..times.len()).step_by(LANES) {
-            let n = LANES.min(times.len() - first);
+        for first in run.clone().step_by(LANES) {
+            let Some((columns, times)) = self.block(first) else {
+                return;
+            };
             let mut distances = [f32::INFINITY; LANES];
-            let block = columns.map(|c| &c[first..first + n]);
-            let block_times = &times[first..first + n];
-            if let (Some(full), Some(full_times)) = (full_block(&block), block_times.first_chunk())
-            {
-                gated_distances(full, full_times, feature, time, search, &mut distances);
-            } else {
-                let mut padded = [[f32::INFINITY; LANES]; 6];
-                for (to, from) in padded.iter_mut().zip(&block) {
-                    to[..n].copy_from_slice(from);
-                }
-                let mut padded_times = [time; LANES];
-                padded_times[..n].copy_from_slice(block_times);
-                let padded = padded.each_ref();
-                gated_distances(padded, &padded_times, feature, time, search, &mut distances);
-            }
-            let nearest = distances
+            gated_distances(columns, times, feature, time, search, &mut distances);
+            // What is behind the end of the run belongs to other cells.
+            let n = run.end - first;
+            let within = distances
                 .iter()
-                .fold(f32::INFINITY, |a, &b| if b < a { b } else { a });
+                .zip(0..)
+                .map(|(&d, lane)| if lane < n { d } else { f32::INFINITY });
+            let nearest = within.fold(f32::INFINITY, |a, b| if b < a { b } else { a });
             if nearest > best.worst {
                 continue;
             }
-            for (lane, &d) in distances[..n].iter().enumerate() {
+            for (lane, &d) in distances.iter().enumerate().take(n) {
                 if d <= best.worst {
-                    best.insert(d, self.original(run.start + first + lane));
+                    best.insert(d, self.original(first + lane));
                 }
             }
         }
     }
-}
-
-/// The six columns as arrays, if they are long enough.
-#[inline(always)]
-fn full_block<'a>(block: &[&'a [f32]; 6]) -> Option<[&'a [f32; LANES]; 6]> {
-    let [a, b, c, d, e, f] = block;
-    Some([
-        a.first_chunk()?,
-        b.first_chunk()?,
-        c.first_chunk()?,
-        d.first_chunk()?,
-        e.first_chunk()?,
-        f.first_chunk()?,
-    ])
 }
 
 /// Squared distances of `LANES` candidates; infinite where the time gap is too small.

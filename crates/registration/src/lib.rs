@@ -19,8 +19,9 @@ pub use fixed_view::FixedView;
 pub use globals::{GlobalPrior, Globals, N_GLOBALS, index};
 pub use health::Health;
 pub use normal_equations::NormalEquations;
+pub use rows::RowGroup;
 pub use settings::{ImuNoise, Settings};
-pub use solve::{Solution, SolveError, Solver};
+pub use solve::{Solution, SolveError, Solver, System};
 pub use window::{Initial, Problem, Registration, first_equations, register_window};
 
 /// A vector of all global states or their corrections.

@@ -88,7 +88,6 @@ impl NormalEquations {
     }
 
     /// Diagonal of the block between a control point and itself, of which every one exists.
-    #[cfg(test)]
     pub(crate) fn diagonal(&self, control: usize) -> [f64; 6] {
         std::array::from_fn(|i| self.blocks[control][i][i])
     }

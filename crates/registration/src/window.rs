@@ -12,8 +12,7 @@ use crate::matches::{self, MatchRows};
 use crate::placed::Placed;
 use crate::solve::{Factorized, Solution, SolveError, Solver};
 use crate::{
-    FixedView, GlobalMatrix, GlobalPrior, GlobalVector, Globals, Health, N_GLOBALS,
-    NormalEquations, Settings,
+    FixedView, GlobalMatrix, GlobalPrior, GlobalVector, Globals, Health, NormalEquations, Settings,
 };
 
 /// How the start of the trajectory is held.

@@ -1,15 +1,29 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! From points to surfels.
 
+#![allow(
+    clippy::inline_always,
+    reason = "only what is inlined into a dispatched function uses the machine's instructions"
+)]
+
 use bentwing_trajectory::{Head, Trajectory};
 use nalgebra::Vector3;
+use pulp::{Arch, Simd, WithSimd};
 use rustc_hash::FxHashMap;
 
-use crate::{Moments, SurfelSet, place_points, sym3};
+use crate::place::Placer;
+use crate::{Moments, SurfelSet, sym3};
 
 /// Bits per voxel coordinate in a packed key; enough for ±400 km at 0.4 m.
 const KEY_BITS: u32 = 21;
 const KEY_OFFSET: i64 = 1 << (KEY_BITS - 1);
+const KEY_MASK: u64 = (1 << KEY_BITS) - 1;
+
+/// Points that are placed before they are merged.
+const BLOCK: usize = 1 << 14;
+
+/// Voxels that are found without the hash map: 2 to this power.
+const RECENT_BITS: u32 = 12;
 
 /// The budget of a shorter stretch is that of this one, s.
 const MIN_DURATION: f64 = 0.1;
@@ -62,30 +76,20 @@ pub fn extract(
     head: &Head,
     settings: &Settings,
 ) -> SurfelSet {
-    let placed = place_points(
-        points.points,
-        points.stamps,
-        points.angles,
-        trajectory,
-        head,
-    );
     let origin = trajectory.positions()[0];
     let mut set = SurfelSet {
         level_starts: vec![0],
         ..SurfelSet::default()
     };
     let mut ranks = Vec::new();
-    let mut cells = merge(
-        of_points(&placed, points, origin, settings.voxel_size),
-        settings,
-    );
+    let mut cells = cells_of(points, &Placer::new(trajectory, head), origin, settings);
     for level in 0..settings.n_levels {
         if level > 0 {
-            let coarser = cells.into_iter().map(|c| Cell {
-                key: coarser(c.key),
-                ..c
-            });
-            cells = merge(coarser, settings);
+            let mut merger = Merger::new(settings);
+            for cell in &cells {
+                merger.add(coarser(cell.key), &cell.moments);
+            }
+            cells = merger.merged;
         }
         let size = settings.voxel_size * f64::from(1u32 << level);
         for cell in &cells {
@@ -151,52 +155,108 @@ fn rank(key: u64, level: usize) -> u64 {
     x ^ (x >> 31)
 }
 
-/// The placed points as cells of one point each.
-fn of_points(
-    placed: &[[f64; 3]],
+/// Merges the points of each voxel, block by block: what is placed is merged before it has left
+/// the cache.
+fn cells_of(
     points: Points<'_>,
+    placer: &Placer<'_>,
     origin: Vector3<f64>,
-    voxel_size: f64,
-) -> impl Iterator<Item = Cell> {
-    placed.iter().enumerate().map(move |(i, p)| {
-        let angle = points.angles.get(i).copied().unwrap_or(0.0);
-        let local = [p[0] - origin.x, p[1] - origin.y, p[2] - origin.z];
-        Cell {
-            key: pack(p, voxel_size),
-            moments: Moments::of_point(local, points.stamps[i], angle),
+    settings: &Settings,
+) -> Vec<Cell> {
+    let arch = Arch::new();
+    let mut placed = vec![[0.0; 3]; BLOCK.min(points.points.len())];
+    let mut keys = vec![0; placed.len()];
+    let mut merger = Merger::new(settings);
+    for first in (0..points.points.len()).step_by(BLOCK) {
+        let block = first..(first + BLOCK).min(points.points.len());
+        let (placed, keys) = (&mut placed[..block.len()], &mut keys[..block.len()]);
+        let angles = points.angles.get(block.clone()).unwrap_or(&[]);
+        placer.place(
+            &points.points[block.clone()],
+            &points.stamps[block.clone()],
+            angles,
+            placed,
+        );
+        arch.dispatch(Packing {
+            points: placed,
+            size: settings.voxel_size,
+            keys,
+        });
+        for (i, (p, &key)) in block.zip(placed.iter().zip(keys.iter())) {
+            let angle = points.angles.get(i).copied().unwrap_or(0.0);
+            let local = [p[0] - origin.x, p[1] - origin.y, p[2] - origin.z];
+            merger.add_point(key, local, points.stamps[i], angle);
         }
-    })
+    }
+    merger.merged
 }
 
 /// Merges cells of the same voxel as long as neither a pause nor the span of time forbids it.
 ///
-/// Takes them in order of their first times and returns them so.
-fn merge(cells: impl IntoIterator<Item = Cell>, settings: &Settings) -> Vec<Cell> {
-    let mut open = FxHashMap::default();
-    let mut merged: Vec<Cell> = Vec::new();
-    let mut latest = 0;
-    for cell in cells {
-        // A scan line stays in a voxel for many points.
-        if merged.get(latest).is_none_or(|m| m.key != cell.key) {
-            latest = *open.entry(cell.key).or_insert(merged.len());
-        }
-        match merged.get_mut(latest) {
-            Some(m) if belongs(&m.moments, &cell.moments, settings) => {
-                m.moments.merge(&cell.moments);
-            }
-            _ => {
-                latest = merged.len();
-                open.insert(cell.key, latest);
-                merged.push(cell);
-            }
-        }
-    }
-    merged
+/// Takes them in order of their first times and keeps them so.
+struct Merger<'a> {
+    settings: &'a Settings,
+    merged: Vec<Cell>,
+    /// Where the latest cell of each voxel is.
+    open: FxHashMap<u64, usize>,
+    /// The same for some voxels, in the place that their keys' hashes give them.
+    recent: Vec<(u64, usize)>,
 }
 
-fn belongs(earlier: &Moments, later: &Moments, settings: &Settings) -> bool {
-    let ((start, end), (next_start, next_end)) = (earlier.span(), later.span());
-    next_start - end <= settings.max_gap && next_end - start <= settings.max_span
+impl<'a> Merger<'a> {
+    fn new(settings: &'a Settings) -> Self {
+        Self {
+            settings,
+            merged: Vec::new(),
+            open: FxHashMap::default(),
+            // Of no voxel: keys have 63 bits.
+            recent: vec![(u64::MAX, 0); 1 << RECENT_BITS],
+        }
+    }
+
+    #[inline]
+    fn add_point(&mut self, key: u64, p: [f64; 3], time: f64, angle: f64) {
+        match self.cell_for(key, (time, time)) {
+            Some(moments) => moments.add_point(p, time, angle),
+            None => self.push(key, Moments::of_point(p, time, angle)),
+        }
+    }
+
+    fn add(&mut self, key: u64, moments: &Moments) {
+        match self.cell_for(key, moments.span()) {
+            Some(earlier) => earlier.merge(moments),
+            None => self.push(key, *moments),
+        }
+    }
+
+    /// The latest cell of the voxel, if what has been seen in the span of time belongs to it.
+    #[inline]
+    fn cell_for(&mut self, key: u64, span: (f64, f64)) -> Option<&mut Moments> {
+        let recent = &mut self.recent[slot(key)];
+        if recent.0 != key {
+            *recent = (key, *self.open.get(&key)?);
+        }
+        let moments = &mut self.merged[recent.1].moments;
+        belongs(moments.span(), span, self.settings).then_some(moments)
+    }
+
+    /// Opens the next cell of a voxel.
+    fn push(&mut self, key: u64, moments: Moments) {
+        self.recent[slot(key)] = (key, self.merged.len());
+        self.open.insert(key, self.merged.len());
+        self.merged.push(Cell { key, moments });
+    }
+}
+
+/// Place of a key among the recent ones.
+#[inline]
+fn slot(key: u64) -> usize {
+    (key.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> (64 - RECENT_BITS)) as usize
+}
+
+#[inline]
+fn belongs(earlier: (f64, f64), later: (f64, f64), settings: &Settings) -> bool {
+    later.0 - earlier.1 <= settings.max_gap && later.1 - earlier.0 <= settings.max_span
 }
 
 /// Adds the surfel of a cell, if it is one; returns whether it is.
@@ -244,24 +304,46 @@ fn push_surfel(
     true
 }
 
-fn pack(p: &[f64; 3], size: f64) -> u64 {
-    let mut key = 0;
-    for c in p {
-        let i = (c / size).floor() as i64 + KEY_OFFSET;
-        key = key << KEY_BITS | (i as u64 & ((1 << KEY_BITS) - 1));
+/// Packs the voxel coordinates of each point into a key.
+struct Packing<'a> {
+    points: &'a [[f64; 3]],
+    size: f64,
+    keys: &'a mut [u64],
+}
+
+impl WithSimd for Packing<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        for (p, key) in self.points.iter().zip(self.keys) {
+            *key = pack(p, self.size);
+        }
     }
-    key
+}
+
+#[inline(always)]
+fn pack(p: &[f64; 3], size: f64) -> u64 {
+    let [x, y, z] = [p[0], p[1], p[2]].map(|c| index_bits((c / size).floor()));
+    x << (2 * KEY_BITS) | y << KEY_BITS | z
+}
+
+/// The lowest bits of an integer and the offset. A float of 3 · 2⁵¹ has room for them in its last
+/// bits; processors have no conversion of several floats at a time that is safe for all values.
+#[inline(always)]
+fn index_bits(whole: f64) -> u64 {
+    const ROOM: f64 = 3.0 * (1u64 << 51) as f64;
+    (whole + ROOM).to_bits().wrapping_add(KEY_OFFSET as u64) & KEY_MASK
 }
 
 /// Key of the voxel of twice the size that contains the voxel of `key`.
 ///
 /// Half the offset is added back so that the coordinate zero keeps its place.
 fn coarser(key: u64) -> u64 {
-    let mask = (1u64 << KEY_BITS) - 1;
     let mut coarse = 0;
     for shift in [2 * KEY_BITS, KEY_BITS, 0] {
-        let i = ((key >> shift & mask) as i64 - KEY_OFFSET).div_euclid(2) + KEY_OFFSET;
-        coarse = coarse << KEY_BITS | (i as u64 & mask);
+        let i = ((key >> shift & KEY_MASK) as i64 - KEY_OFFSET).div_euclid(2) + KEY_OFFSET;
+        coarse = coarse << KEY_BITS | (i as u64 & KEY_MASK);
     }
     coarse
 }

@@ -31,6 +31,23 @@ impl Moments {
         }
     }
 
+    /// Adds a point that is not earlier than the first one.
+    #[inline]
+    pub fn add_point(&mut self, p: [f64; 3], time: f64, angle: f64) {
+        let [x, y, z] = p;
+        self.n += 1;
+        self.last_time = self.last_time.max(time);
+        self.time += time;
+        self.angle += angle;
+        for (a, b) in self.sum.iter_mut().zip(p) {
+            *a += b;
+        }
+        let products = [x * x, x * y, x * z, y * y, y * z, z * z];
+        for (a, b) in self.products.iter_mut().zip(products) {
+            *a += b;
+        }
+    }
+
     /// Adds the points of `other`.
     pub fn merge(&mut self, other: &Self) {
         self.n += other.n;

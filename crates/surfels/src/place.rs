@@ -1,8 +1,14 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Places time-stamped lidar points in the map.
 
+#![allow(
+    clippy::inline_always,
+    reason = "only what is inlined into a dispatched function uses the machine's instructions"
+)]
+
 use bentwing_trajectory::{Head, Trajectory};
-use nalgebra::{Isometry3, Matrix3, Vector3};
+use nalgebra::{Matrix3, Vector3};
+use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 /// Points per parallel task; fixed, so that results do not depend on the number of threads.
@@ -19,67 +25,119 @@ pub fn place_points(
     trajectory: &Trajectory,
     head: &Head,
 ) -> Vec<[f64; 3]> {
-    let placer = Placer::new(trajectory, head);
     let mut placed = vec![[0.0; 3]; points.len()];
-    placed
-        .par_chunks_mut(CHUNK)
-        .enumerate()
-        .for_each(|(c, out)| {
-            for (i, out) in (c * CHUNK..).zip(out) {
-                let angle = angles.get(i).copied().unwrap_or(0.0);
-                *out = placer.place(&points[i], times[i], angle);
-            }
-        });
+    Placer::new(trajectory, head).place(points, times, angles, &mut placed);
     placed
 }
 
-struct Placer<'a> {
+/// Places points with one trajectory and head.
+pub(crate) struct Placer<'a> {
     trajectory: &'a Trajectory,
     head: &'a Head,
     rotations: Vec<Matrix3<f64>>,
-    R_imu_lidar: Matrix3<f64>,
-    t_imu_lidar: Vector3<f64>,
+    R_imu_base: Matrix3<f64>,
+    t_imu_base: Vector3<f64>,
 }
 
 impl<'a> Placer<'a> {
-    fn new(trajectory: &'a Trajectory, head: &'a Head) -> Self {
+    pub(crate) fn new(trajectory: &'a Trajectory, head: &'a Head) -> Self {
         let rotations = trajectory.rotations().iter();
         let rotations = rotations
             .map(|q| q.to_rotation_matrix().into_inner())
             .collect();
-        let (R_imu_lidar, t_imu_lidar) = head.lidar_in_imu(0.0);
+        let base = &head.T_imu_base;
         Self {
             trajectory,
             head,
             rotations,
-            R_imu_lidar,
-            t_imu_lidar,
+            R_imu_base: base.rotation.to_rotation_matrix().into_inner(),
+            t_imu_base: base.translation.vector,
         }
     }
 
-    fn in_imu(&self, p: &[f64; 3], angle: f64) -> Vector3<f64> {
-        let p = Vector3::from(*p);
-        if self.head.motor.is_none() {
-            return self.R_imu_lidar * p + self.t_imu_lidar;
-        }
-        let T: &Isometry3<f64> = &self.head.T_imu_base;
-        T.transform_point(&self.head.point_in_base(&p, angle).into())
-            .coords
+    /// Places `points` into `placed`, which is as long.
+    pub(crate) fn place(
+        &self,
+        points: &[[f64; 3]],
+        times: &[f64],
+        angles: &[f64],
+        placed: &mut [[f64; 3]],
+    ) {
+        let arch = Arch::new();
+        let chunks = placed.par_chunks_mut(CHUNK).enumerate();
+        chunks.for_each(|(c, placed)| {
+            let chunk = c * CHUNK..c * CHUNK + placed.len();
+            let (points, times) = (&points[chunk.clone()], &times[chunk.clone()]);
+            let turned: Vec<[f64; 3]>;
+            let points = if self.head.motor.is_some() {
+                let angle = |i: usize| angles.get(i).copied().unwrap_or(0.0);
+                let in_base = |(p, i): (&[f64; 3], usize)| {
+                    let p = Vector3::from(*p);
+                    self.head.point_in_base(&p, angle(i)).into()
+                };
+                turned = points.iter().zip(chunk).map(in_base).collect();
+                &turned
+            } else {
+                points
+            };
+            // The widest instructions of the machine; the order of operations is the same.
+            let placer = self;
+            arch.dispatch(Chunk {
+                placer,
+                points,
+                times,
+                placed,
+            });
+        });
     }
 
-    fn place(&self, p: &[f64; 3], stamp: f64, angle: f64) -> [f64; 3] {
-        let p = self.in_imu(p, angle);
-        let trajectory = self.trajectory;
-        let (n, u) = trajectory.locate(stamp - self.head.latency);
-        // Exp(u φ) p as a series: a step is at most about 0.1 rad, so the fifth term is below 1e-7.
-        let w = trajectory.steps()[n] * u;
-        let c1 = w.cross(&p);
-        let c2 = w.cross(&c1);
-        let c3 = w.cross(&c2);
-        let c4 = w.cross(&c3);
-        let turned = p + c1 + c2 / 2.0 + c3 / 6.0 + c4 / 24.0;
-        let (p0, p1) = (trajectory.positions()[n], trajectory.positions()[n + 1]);
-        (self.rotations[n] * turned + p0 + (p1 - p0) * u).into()
+    /// Places points between sample `n` and the next, each a fraction of the way.
+    #[inline(always)]
+    fn place_run(&self, n: usize, points: &[[f64; 3]], fractions: &[f64], placed: &mut [[f64; 3]]) {
+        let (positions, w) = (self.trajectory.positions(), self.trajectory.steps()[n]);
+        let (p0, shift) = (positions[n], positions[n + 1] - positions[n]);
+        let (R, R_imu_base, t_imu_base) = (self.rotations[n], self.R_imu_base, self.t_imu_base);
+        for ((p, &u), placed) in points.iter().zip(fractions).zip(placed) {
+            let p = R_imu_base * Vector3::new(p[0], p[1], p[2]) + t_imu_base;
+            // Exp(u w) p as a series: a step is at most about 0.1 rad, so the fifth term is below 1e-7.
+            let c1 = w.cross(&p);
+            let c2 = w.cross(&c1);
+            let c3 = w.cross(&c2);
+            let c4 = w.cross(&c3);
+            let turned =
+                p + (c1 + (c2 + (c3 + c4 * (u * 0.25)) * (u * (1.0 / 3.0))) * (u * 0.5)) * u;
+            let q = R * turned + p0 + shift * u;
+            *placed = [q.x, q.y, q.z];
+        }
+    }
+}
+
+/// What one task places. A closure would not be inlined into the dispatched function.
+struct Chunk<'a> {
+    placer: &'a Placer<'a>,
+    points: &'a [[f64; 3]],
+    times: &'a [f64],
+    placed: &'a mut [[f64; 3]],
+}
+
+impl WithSimd for Chunk<'_> {
+    type Output = ();
+
+    /// Places points run by run; all points of a run are between the same two samples.
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let (trajectory, latency) = (self.placer.trajectory, self.placer.head.latency);
+        let located = self.times.iter().map(|t| trajectory.locate(t - latency));
+        let (samples, fractions): (Vec<usize>, Vec<f64>) = located.unzip();
+        let mut start = 0;
+        for run in samples.chunk_by(|a, b| a == b) {
+            let range = start..start + run.len();
+            start = range.end;
+            let points = &self.points[range.clone()];
+            let placed = &mut self.placed[range.clone()];
+            let fractions = &fractions[range];
+            self.placer.place_run(run[0], points, fractions, placed);
+        }
     }
 }
 
@@ -87,6 +145,7 @@ impl<'a> Placer<'a> {
 mod tests {
     use super::*;
     use bentwing_trajectory::{Motor, so3};
+    use nalgebra::Isometry3;
 
     #[test]
     fn points_are_placed_by_the_interpolated_pose_and_the_chain_of_frames() {

@@ -124,6 +124,7 @@ impl Trajectory {
     }
 
     /// Index of the sample before `t` and the fraction towards the next; both clamped to the ends.
+    #[inline]
     pub fn locate(&self, t: f64) -> (usize, f64) {
         let x = ((t - self.t0) / self.dt).clamp(0.0, (self.len() - 1) as f64);
         let n = (x as usize).min(self.len() - 2);

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! The registration of a flight as one window.
+
+use bentwing_registration::{
+    GlobalMatrix, GlobalPrior, Initial, N_GLOBALS, NormalEquations, Problem, first_equations,
+};
+
+use crate::Flight;
+
+/// A head without motor: the last five states do not exist.
+pub fn prior() -> GlobalPrior {
+    GlobalPrior {
+        information: GlobalMatrix::from_diagonal_element(1e5),
+        offset: [0.0; N_GLOBALS],
+        frozen: std::array::from_fn(|g| g >= N_GLOBALS - 5),
+    }
+}
+
+impl Flight {
+    /// The normal equations of the whole flight.
+    pub fn equations(&self) -> NormalEquations {
+        let (sets, prior) = (self.surfels(), prior());
+        let problem = Problem {
+            trajectory: self.trajectory.clone(),
+            sets: &sets,
+            views: &[],
+            imu: Some(&self.imu),
+            globals: self.globals.clone(),
+            prior: &prior,
+            initial: Initial::Clamped,
+        };
+        first_equations(&problem, &self.settings())
+    }
+}

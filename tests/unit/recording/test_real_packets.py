@@ -70,7 +70,8 @@ def test_a_vlp16_set_by_gps_gives_four_turns_on_its_own_clock(vlp16):
 def test_a_vlp16_standing_still_is_mapped_where_it_stands(vlp16, tmp_path):
     run = map_recording(vlp16, None, tmp_path / "out")
     assert json.loads((tmp_path / "out" / "run.json").read_text())["complete"]
-    assert np.abs(run.trajectory.positions).max() < 0.02
+    # Four tenths of a second of a lidar alone, with ranges of 3 cm of noise.
+    assert np.abs(run.trajectory.positions).max() < 0.03
 
 
 def clouds(path):

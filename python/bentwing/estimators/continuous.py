@@ -34,6 +34,9 @@ LOOK_AHEAD = 6.0
 # Where data comes faster than it is registered, the repetition is given up this many rehearsals
 # after the start: what was learned is used all the same, and the buffer must not grow.
 LATEST_REPETITION = 4.0
+# Final poses hold a calibration by a part at the value they were estimated with, so that one
+# rehearsal leaves a sixth of the payload's error, and two next to nothing.
+REPETITIONS = 2
 # A start in motion is rehearsed over these stretches first, s: velocity, then attitude.
 MOVING_REHEARSALS = (2.0, 5.0)
 
@@ -41,7 +44,7 @@ MOVING_REHEARSALS = (2.0, 5.0)
 class Continuous:
     """Continuous-time surfel odometry; feed batches in time order, then ask for the result.
 
-    The first seconds are rehearsed: run once to learn the calibration, then again with it, since
+    The first seconds are rehearsed: run twice to learn the calibration, then again with it, since
     latency, extrinsics and accelerometer bias cannot be known before the payload has turned. A
     start in motion is rehearsed over longer and longer stretches, to learn velocity and attitude.
     """
@@ -186,7 +189,7 @@ class Continuous:
             self._start = start
             if self.settings.rehearsal > 0:
                 short = () if start.static is not None else MOVING_REHEARSALS
-                self._rehearsals = (*short, self.settings.rehearsal)
+                self._rehearsals = (*short, *REPETITIONS * (self.settings.rehearsal,))
         self._pass = self._new_pass(self._start, None)
         return True
 
@@ -204,7 +207,7 @@ class Continuous:
             self._first,
             rehearsed,
             # What a short rehearsal says of the biases is not worth keeping.
-            keep=not self._rehearsals,
+            keep=len(self._rehearsals) < REPETITIONS,
             before=self._before[-1] if self._before else None,
         )
         if start.static is not None and self.settings.n_views:

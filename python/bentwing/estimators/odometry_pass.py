@@ -154,7 +154,7 @@ class OdometryPass:
         )
         self.samples = self.samples.replaced(first, result.samples)
         self.globals = result.globals
-        self.covariance = result.covariance
+        self.covariance = self.prior.discounted(result.covariance)
         length = self._end - start
         shift = min(self._settings.shift, length)
         self.prior.carry(result.covariance, result.offset, shift, length)
@@ -185,7 +185,7 @@ class OdometryPass:
             "gravity": self.globals.gravity.tolist(),
             "extrinsic_translation": self.globals.base_translation.tolist(),
             "extrinsic_quat_xyzw": self.globals.base_quat_xyzw.tolist(),
-            "std": named_std(result.covariance, self.prior.frozen),
+            "std": named_std(self.covariance, self.prior.frozen),
         }
 
     def _retire(self) -> None:

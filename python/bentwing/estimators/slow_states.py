@@ -52,8 +52,9 @@ WALK = {
     "accel_bias": 3e-4,
 }
 
-# Each second is seen in several windows, and the matches of a surface are not independent.
-MATCH_INDEPENDENCE = 0.1
+# The matches of a surface are not independent: so large a share of what a window says of the slow
+# states is new. Chosen so that the stated standard deviations were those of the errors.
+MATCH_INDEPENDENCE = 0.02
 
 
 def initial_std(*, moving: bool) -> dict[str, float]:
@@ -106,6 +107,17 @@ class SlowStatePrior:
         self._information[:, index] = 0.0
         self._information[index, index] = np.asarray(std) ** -2.0
         self._offset[index] = 0.0
+
+    def discounted(self, covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the covariance (20, 20) after a window as it is if matches depend on each other."""
+        active = ~self.frozen
+        honest = np.zeros_like(covariance)
+        if active.any():
+            block = np.ix_(active, active)
+            before = self._information[block]
+            gained = _positive_part(np.linalg.inv(covariance[block]) - before)
+            honest[block] = np.linalg.inv(before + MATCH_INDEPENDENCE * gained)
+        return honest
 
     def carry(
         self,

@@ -142,7 +142,7 @@ def register_window(
             gyro_bias=result.globals.gyro_bias,
             accel_bias=result.globals.accel_bias,
             gravity=result.globals.gravity,
-            std=named_std(result.covariance, known.frozen),
+            std=named_std(known.discounted(result.covariance), known.frozen),
         ),
         n_surfels=result.n_surfels,
         n_matches=result.n_matches,

@@ -12,18 +12,9 @@ from bentwing.estimators.core_settings import CoreSettings
 from bentwing.estimators.mount import described_mount
 from bentwing.estimators.odometry_pass import DT, MARGIN, OdometryPass
 from bentwing.estimators.outcome import estimate_of
-from bentwing.estimators.segments import (
-    JUDGED,
-    MAX_IMU_GAP,
-    Break,
-    found_again,
-)
+from bentwing.estimators.segments import JUDGED, MAX_IMU_GAP, Break, found_again
 from bentwing.estimators.settings import ContinuousSettings
-from bentwing.estimators.start import (
-    Start,
-    find_start,
-    level_start,
-)
+from bentwing.estimators.start import Start, find_start, level_start
 
 if TYPE_CHECKING:
     from bentwing.estimators.interface import Estimate
@@ -34,8 +25,8 @@ LOOK_AHEAD = 6.0
 # Where data comes faster than it is registered, the repetition is given up this many rehearsals
 # after the start: what was learned is used all the same, and the buffer must not grow.
 LATEST_REPETITION = 4.0
-# Final poses hold a calibration by a part at the value they were estimated with, so that one
-# rehearsal leaves a sixth of the payload's error, and two next to nothing.
+# Final poses partly hold the calibration at the value they were estimated with, so that one
+# rehearsal leaves some of the payload's error, and a second one less.
 REPETITIONS = 2
 # A start in motion is rehearsed over these stretches first, s: velocity, then attitude.
 MOVING_REHEARSALS = (2.0, 5.0)

@@ -63,7 +63,6 @@ class OdometryPass:
         self._surfels: list[tuple[float, _core.Surfels]] = []
         self._views = FixedViews(settings)
         self._finished: list[tuple[NDArray[np.float64], NDArray[np.float64]]] = []
-        self._n_finished = 0
         self._end = samples.end
         self.covariance = np.zeros((20, 20))
         self.timings = {"propagate": 0.0, "surfels": 0.0, "register": 0.0}

@@ -61,7 +61,7 @@ class ContinuousSettings(_Section):
     rehearsal: float = Field(
         10.0,
         ge=0,
-        description="seconds after the start that are run twice, for the calibration; 0: never",
+        description="seconds after the start that are run twice more, for the calibration; 0: never",
     )
     view_length: float = Field(1.5, gt=0, description="of a fixed view, s")
     view_distance: float = Field(1.5, gt=0, description="motion that renews the fixed views, m")

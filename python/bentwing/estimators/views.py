@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""Fixed views: immovable surfels from earlier in the trajectory, like keyframes (Kaul 2015, 2.1)."""
+"""Fixed views: surfels of final poses from earlier on, like keyframes (Kaul 2015, section 2.1)."""
 
 from __future__ import annotations
 
@@ -17,11 +17,9 @@ if TYPE_CHECKING:
 
     from bentwing.estimators.settings import ContinuousSettings
 
-# A view seen before the payload turned holds little; one this many times richer replaces it
+# A view seen before the payload turned holds little; one this many times richer follows it
 # without waiting for motion.
 RICHER = 1.3
-
-
 # Views that are still known; more hold drift down over longer loops, for a megabyte each.
 MAX_POOL = 48
 # Of the views that take part so many are the newest; the others are those of the nearest places.

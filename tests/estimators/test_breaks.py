@@ -9,8 +9,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bentwing import estimators
+from bentwing import estimators, geometry
+from bentwing.estimators.start import levelling
 from bentwing.evaluate.trajectory import absolute_error
+from bentwing.live.prediction import Prediction
 from bentwing.preprocess import preprocess
 from bentwing.recording import ImuBatch, LidarBatch, Payload, Recording
 from bentwing.trajectory import read_tum
@@ -33,6 +35,7 @@ def mapped(flight):
 
     def estimate(start, stop, *silent):
         engine = estimators.create("continuous", flight.payload, None, 2)
+        flight.engine = engine
         for batch in flight.batches:
             if isinstance(batch, silent):
                 batch = batch.where((batch.times < start) | (batch.times > stop))
@@ -57,6 +60,19 @@ def test_what_cannot_be_bridged_is_cut_in_two(flight, mapped):
     assert np.diff(estimate.trajectory.times) == pytest.approx(0.01)
     (sentence,) = [w for w in estimate.warnings if "begins anew" in w]
     assert "from 8.00 to 15.0" in sentence
+
+
+def test_live_poses_behind_a_break_are_those_of_the_estimate(flight, mapped):
+    estimate = mapped(8.0, 15.0, LidarBatch, ImuBatch)
+    (newest,) = flight.engine.passes
+    recent = Prediction(newest).recent
+    within = slice(2, -1)  # the first sample is interpolated over the break
+    positions, quats = estimate.trajectory.interpolate(recent.times[within])
+    assert np.abs(recent.positions[within] - positions).max() < 2e-4
+    assert np.abs(recent.quats_xyzw[within] - quats).max() < 1e-3
+    # Levelled about the origin they would be elsewhere.
+    first, tilt = newest.samples.positions[0], levelling(newest.globals.gravity)
+    assert np.linalg.norm(geometry.rotate(tilt, first) - first) > 4e-4
 
 
 def test_a_second_without_imu_is_bridged_by_what_the_lidar_sees(flight, mapped):

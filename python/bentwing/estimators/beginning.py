@@ -13,10 +13,9 @@ from bentwing import _core, geometry
 from bentwing.estimators.core_states import core_globals
 from bentwing.estimators.interface import Calibration
 from bentwing.estimators.odometry_pass import DT, OdometryPass
-from bentwing.estimators.outcome import segment_of
-from bentwing.estimators.segments import heading
+from bentwing.estimators.segments import extrapolated, heading
 from bentwing.estimators.slow_states import SlowStatePrior, initial_std
-from bentwing.estimators.start import STANDARD_GRAVITY, attitude_of, levelling
+from bentwing.estimators.start import STANDARD_GRAVITY, attitude_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -67,7 +66,7 @@ def begin_pass(
         prior = _prior(situation, start, before)
     positions, quats = _first_poses(start, first, rehearsed, slow)
     if before is not None:
-        at, quat = segment_of(before).extrapolated(first)
+        at, quat = extrapolated(before.trajectory(), first)
         turn = heading(geometry.multiply(quat, geometry.inverse(quats[0])))
         positions = at + geometry.rotate(turn, positions)
         quats = geometry.multiply(np.broadcast_to(turn, quats.shape), quats)
@@ -116,10 +115,8 @@ def _first_poses(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the rest at the start, or the first two poses of a start in motion, from the origin."""
     if start.static is None and rehearsed is not None:
-        _, positions, quats = rehearsed.trajectory()
-        level = levelling(rehearsed.globals.gravity)
-        positions = geometry.rotate(level, positions[:2] - positions[0])
-        return positions, geometry.multiply(np.stack([level, level]), quats[:2])
+        known = rehearsed.trajectory()
+        return known.positions[:2] - known.positions[0], known.quats_xyzw[:2]
     n = max(2, int((start.hold - first) / DT) + 1)
     quat = start.quat_xyzw
     if start.static is not None:

@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bentwing import _core
+from bentwing import _core, geometry
 from bentwing.estimators.slow_states import SlowStatePrior, named_std
+from bentwing.estimators.start import levelling
 from bentwing.estimators.views import FixedViews
+from bentwing.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -58,6 +60,7 @@ class OdometryPass:
         self._threads = threads
         self._resting = resting
         self._origin = samples.start
+        self._first_position = samples.positions[0]
         # Windows begin no earlier than this.
         self._anchor = samples.end if resting else samples.start
         self._surfels: list[tuple[float, _core.Surfels]] = []
@@ -95,12 +98,28 @@ class OdometryPass:
         self._lap("register", watch)
         self._retire()
 
-    def trajectory(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Return times (N,), positions (N, 3) and quaternions (N, 4) of all samples so far."""
+    def trajectory(self) -> Trajectory:
+        """Return all samples so far, levelled."""
         parts = [*self._finished, (self.samples.positions, self.samples.quats_xyzw)]
-        positions = np.concatenate([p for p, _ in parts])
-        times = self._origin + DT * np.arange(len(positions), dtype=np.float64)
-        return times, positions, np.concatenate([q for _, q in parts])
+        positions, quats = zip(*parts, strict=True)
+        return self._levelled(self._origin, np.concatenate(positions), np.concatenate(quats))
+
+    def recent(self) -> Trajectory:
+        """Return the end of the trajectory, levelled."""
+        samples = self.samples
+        return self._levelled(samples.start, samples.positions, samples.quats_xyzw)
+
+    def level(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Turn points (N, 3) so that gravity is vertical, about the first position, m, map frame."""
+        first: NDArray[np.float64] = self._first_position
+        return first + geometry.rotate(levelling(self.globals.gravity), points - first)
+
+    def _levelled(
+        self, start: float, positions: NDArray[np.float64], quats: NDArray[np.float64]
+    ) -> Trajectory:
+        turn = np.broadcast_to(levelling(self.globals.gravity), quats.shape)
+        times = start + DT * np.arange(len(positions), dtype=np.float64)
+        return Trajectory(times, self.level(positions), geometry.multiply(turn, quats))
 
     def snapshot(self) -> OdometryPass:
         """Return the state as it is now, which stays so while the pass goes on."""

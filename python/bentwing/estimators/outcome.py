@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bentwing import geometry
 from bentwing.estimators.core_states import refined_mount
 from bentwing.estimators.interface import Calibration, Estimate
 from bentwing.estimators.odometry_pass import DT, MARGIN
-from bentwing.estimators.segments import Segment, joined
+from bentwing.estimators.segments import joined
 from bentwing.estimators.slow_states import named_std
-from bentwing.estimators.start import STANDARD_GRAVITY, levelling
+from bentwing.estimators.start import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -23,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def estimate_of(passes: Sequence[OdometryPass], described: Mount, notes: list[str]) -> Estimate:
-    """Return what passes that follow each other say.
+    """Return what passes that follow each other say, levelled.
 
     Parameters
     ----------
@@ -31,7 +30,7 @@ def estimate_of(passes: Sequence[OdometryPass], described: Mount, notes: list[st
     described : the mount as the payload has it
     notes : sentences to add to the warnings
     """
-    segments, last = [segment_of(p) for p in passes], passes[-1]
+    segments, last = [p.trajectory() for p in passes], passes[-1]
     windows = [w for p in passes for w in p.windows]
     n_blind = sum(p.n_blind for p in passes)
     slow = last.globals
@@ -53,18 +52,7 @@ def estimate_of(passes: Sequence[OdometryPass], described: Mount, notes: list[st
         },
         timings={name: sum(p.timings[name] for p in passes) for name in last.timings},
         warnings=_warnings(windows, n_blind) + notes,
-        segments=[s.span for s in segments],
-    )
-
-
-def segment_of(done: OdometryPass) -> Segment:
-    """Return the trajectory of a pass, levelled about its first position."""
-    times, positions, quats = done.trajectory()
-    level = levelling(done.globals.gravity)
-    return Segment(
-        times,
-        positions[0] + geometry.rotate(level, positions - positions[0]),
-        geometry.multiply(np.broadcast_to(level, quats.shape), quats),
+        segments=[(float(s.times[0]), float(s.times[-1])) for s in segments],
     )
 
 

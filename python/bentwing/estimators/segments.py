@@ -53,29 +53,18 @@ class Break:
         )
 
 
-@dataclass(frozen=True, slots=True)
-class Segment:
-    """Poses at a uniform rate without a break: times (N,), positions (N, 3), quats_xyzw (N, 4)."""
-
-    times: NDArray[np.float64]
-    positions: NDArray[np.float64]
-    quats_xyzw: NDArray[np.float64]
-
-    @property
-    def span(self) -> tuple[float, float]:
-        """First and last time, s."""
-        return float(self.times[0]), float(self.times[-1])
-
-    def extrapolated(self, time: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Position (3,) and attitude (4,) at a later time if the last motion goes on."""
-        dt = self.times[1] - self.times[0]
-        n = min(round(RECENT / dt), len(self.times) - 1)
-        share = (time - self.times[-1]) / (n * dt)
-        velocity = self.positions[-1] - self.positions[-1 - n]
-        before, last = self.quats_xyzw[-1 - n][None], self.quats_xyzw[-1][None]
-        turn = geometry.log(geometry.multiply(last, geometry.inverse(before)))
-        quat = geometry.multiply(geometry.exp(share * turn), last)
-        return self.positions[-1] + share * velocity, quat.reshape(4)
+def extrapolated(
+    trajectory: Trajectory, time: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Position (3,) and attitude (4,) at a later time if the last motion goes on."""
+    times, positions, quats = trajectory.times, trajectory.positions, trajectory.quats_xyzw
+    dt = times[1] - times[0]
+    n = min(round(RECENT / dt), len(times) - 1)
+    share = (time - times[-1]) / (n * dt)
+    before, last = quats[-1 - n][None], quats[-1][None]
+    turn = geometry.log(geometry.multiply(last, geometry.inverse(before)))
+    quat = geometry.multiply(geometry.exp(share * turn), last)
+    return positions[-1] + share * (positions[-1] - positions[-1 - n]), quat.reshape(4)
 
 
 def found_again(windows: Sequence[dict[str, Any]], silence: Break) -> bool:
@@ -95,17 +84,16 @@ def heading(quat: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.array([0.0, 0.0, 0.0, 1.0]) if length < 1e-9 else twist / length
 
 
-def joined(segments: Sequence[Segment], dt: float) -> Trajectory:
+def joined(segments: Sequence[Trajectory], dt: float) -> Trajectory:
     """One trajectory at a uniform rate, with straight motion over the breaks."""
     if len(segments) == 1:
-        only = segments[0]
-        return Trajectory(only.times, only.positions, only.quats_xyzw)
+        return segments[0]
     poses = Trajectory(
         np.concatenate([s.times for s in segments]),
         np.concatenate([s.positions for s in segments]),
         np.concatenate([s.quats_xyzw for s in segments]),
     )
-    first, last = segments[0].times[0], segments[-1].times[-1]
+    first, last = poses.times[0], poses.times[-1]
     n = int((last - first) / dt + 1e-6) + 1
     times = np.minimum(first + dt * np.arange(n), last)
     return Trajectory(times, *poses.interpolate(times))

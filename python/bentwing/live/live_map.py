@@ -9,8 +9,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing import geometry
-from bentwing.estimators.start import levelling
 from bentwing.map.thin import VoxelSet, voxel_keys
 
 if TYPE_CHECKING:
@@ -72,7 +70,7 @@ class LiveMap:
             registered.globals,
             threads=self._threads,
         )
-        self._keep(geometry.rotate(levelling(registered.globals.gravity), points))
+        self._keep(registered.level(points))
 
     def points(self) -> NDArray[np.float32]:
         """Return all points (N, 3), m, map frame."""

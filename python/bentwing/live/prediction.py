@@ -10,14 +10,13 @@ import numpy as np
 
 from bentwing import _core, geometry
 from bentwing.estimators.odometry_pass import DT
-from bentwing.estimators.start import levelling
-from bentwing.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bentwing.estimators.odometry_pass import OdometryPass
     from bentwing.live.imu_tail import ImuTail
+    from bentwing.trajectory import Trajectory
 
 # Beyond the newest data the last measured rate and force are held for at most this long, s.
 MAX_EXTRAPOLATION = 0.1
@@ -61,20 +60,15 @@ class Prediction:
     """
 
     def __init__(self, registered: OdometryPass) -> None:
-        samples = registered.samples
-        level = levelling(registered.globals.gravity)
-        quats = samples.quats_xyzw
-        times = samples.start + DT * np.arange(len(quats), dtype=np.float64)
-        self.recent = Trajectory(
-            times,
-            geometry.rotate(level, samples.positions),
-            geometry.multiply(np.broadcast_to(level, quats.shape), quats),
-        )
+        self.recent = registered.recent()
         self.registered_until = registered.end - registered.globals.latency
         self._slow = registered.globals.levelled()
         # With inertial samples behind all of them, so that going on from here is final.
         self._carried = _core.Samples(
-            float(times[-2]), DT, self.recent.positions[-2:], self.recent.quats_xyzw[-2:]
+            float(self.recent.times[-2]),
+            DT,
+            self.recent.positions[-2:],
+            self.recent.quats_xyzw[-2:],
         )
 
     @property

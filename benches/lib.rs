@@ -261,6 +261,7 @@ pub fn surfel_settings() -> Surfels {
         min_planarity: 0.3,
         min_width_ratio: 0.03,
         min_width: 0.05,
+        min_incidence_cosine: 0.1,
         max_rate: 4000.0,
     }
 }

@@ -20,7 +20,7 @@ fn window(c: &mut Criterion) {
         let flight = scanner.fly(WINDOW);
         let sets = flight.surfels();
         let first: Vec<_> = sets[..2].iter().map(AsRef::as_ref).collect();
-        let view = FixedView::freeze(&first, 0.0, 1.5, &flight.trajectory, &flight.globals);
+        let view = FixedView::freeze(&first, 0.0, 1.5, &flight.trajectory, &[], &flight.globals);
         for (part, max_outer, n_inner) in [("1x1", 1, 1), ("1x3", 1, 3), ("whole", 5, 2)] {
             let settings = Settings {
                 max_outer,
@@ -32,12 +32,13 @@ fn window(c: &mut Criterion) {
                 b.iter(|| {
                     let problem = Problem {
                         trajectory: flight.trajectory.clone(),
+                        responses: &[],
                         sets: &sets,
                         views: &[&view],
                         imu: Some(&flight.imu),
                         globals: flight.globals.clone(),
                         prior: &prior,
-                        initial: Initial::Clamped,
+                        initial: Initial::Joined,
                     };
                     pool.install(|| register_window(&problem, &settings))
                         .is_ok()

@@ -23,11 +23,12 @@ impl Flight {
         let problem = Problem {
             trajectory: self.trajectory.clone(),
             sets: &sets,
+            responses: &[],
             views: &[],
             imu: Some(&self.imu),
             globals: self.globals.clone(),
             prior: &prior,
-            initial: Initial::Clamped,
+            initial: Initial::Joined,
         };
         first_equations(&problem, &self.settings())
     }

@@ -18,7 +18,6 @@ from bentwing.run_record import bentwing_version
 if TYPE_CHECKING:
     from evalio.types import ImuMeasurement, ImuParams, LidarMeasurement, LidarParams
 
-    from bentwing.estimators.interface import Estimate
     from bentwing.trajectory import Trajectory
 
 Pose = tuple[np.ndarray, np.ndarray]
@@ -138,14 +137,8 @@ class Bentwing(Pipeline):
             estimate = self._estimator.so_far()
         except NotEnoughDataError:
             return
-        if not self._rehearsing(estimate):
-            final = estimate.trajectory.times[-1] - self._settings.window - self._settings.shift
-            self._give(estimate.trajectory, final)
-
-    def _rehearsing(self, estimate: Estimate) -> bool:
-        """Whether these seconds will be estimated once more."""
-        times = [window["time"] for window in estimate.windows]
-        return times[-1] - times[0] <= self._settings.rehearsal + self._settings.shift
+        final = estimate.trajectory.times[-1] - self._settings.window - self._settings.shift
+        self._give(estimate.trajectory, final)
 
     def _give(self, trajectory: Trajectory, until: float) -> None:
         end = min(until, float(trajectory.times[-1]))

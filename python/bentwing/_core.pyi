@@ -159,6 +159,9 @@ class Globals:
     def motor_lidar_quat_xyzw(self) -> NDArray[np.float64] | None:
         """Rotation (4,) of the lidar in the rotating motor frame; None without a motor."""
 
+    def moved_from(self, earlier: Globals) -> list[float]:
+        """Return the correction (20,) that leads from `earlier` to these."""
+
     def levelled(self) -> Globals:
         """Return the same states with gravity straight up."""
 
@@ -206,6 +209,13 @@ class Samples:
 
     def replaced(self, first: int, newer: Samples) -> Samples:
         """Return these samples with those from `first` on replaced by `newer`."""
+
+    def following(self, correction: Sequence[float]) -> Samples:
+        """Return these samples where a correction (20,) of the slow states moves them."""
+
+    @property
+    def responses(self) -> NDArray[np.float64]:
+        """How they follow the slow states (N, 6, 20): derivatives of `[δr, δt]`, rad and m, map frame."""
 
     def extended(self, imu: Imu | None, globals: Globals, until: float) -> tuple[Samples, int]:
         """Extend by the IMU, or at constant velocity without one.
@@ -366,7 +376,7 @@ def register_window(
     information: NDArray[np.float64],
     offset: Sequence[float],
     frozen: Sequence[bool],
-    clamped: bool,
+    joined: bool,
     settings: CoreSettings,
     threads: int = 0,
 ) -> Registration:
@@ -377,8 +387,8 @@ def register_window(
     information : (20, 20) float64 about the prior's mean of the slow states
     offset : (20,) correction that leads from that mean to `globals`
     frozen : (20) slow states that are not estimated
-    clamped : whether the start continues a frozen past (the first three control points stay);
-        otherwise only the first pose stays
+    joined : whether the start continues a past that is final (its first three control points follow
+        the slow states as `samples` do); otherwise only the first pose stays
 
     Raises
     ------

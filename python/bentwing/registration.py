@@ -130,7 +130,7 @@ def register_window(
         information=known.information,
         offset=known.offset,
         frozen=known.frozen.tolist(),
-        clamped=continues,
+        joined=continues,
         settings=CoreSettings.of(settings.registration, payload, _interval(prior)),
         threads=n_threads,
     )

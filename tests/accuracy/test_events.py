@@ -52,7 +52,7 @@ def test_a_gap_is_told_with_its_length_and_place(flown):
 
 
 def test_a_start_in_motion_still_gives_a_map(flown):
-    """The attitude comes from the mean force of the first second, the velocity from rehearsals."""
+    """The attitude comes from the mean force of the first second, the velocity from the first windows."""
     flight = fly(flown, "motion-start")
     assert flight.record["complete"]
     assert flight.score.ate_flight < 0.05

@@ -144,7 +144,7 @@ def register(flight, drifted, extract):
             "information": INFORMATION,
             "offset": [0.0] * 20,
             "frozen": [False] * 15 + [True] * 5,
-            "clamped": False,
+            "joined": False,
             "settings": core,
         }
         return _core.register_window(**{**values, **changed})

@@ -62,7 +62,7 @@ def test_a_registration_with_views_is_the_same_with_any_number_of_threads(
     register, extract, samples, states
 ):
     view = _core.FixedView([extract()], 0.0, 0.8, samples, states())
-    results = [register(views=[view], clamped=True, threads=n) for n in (1, *COUNTS)]
+    results = [register(views=[view], joined=True, threads=n) for n in (1, *COUNTS)]
     assert results[0].n_fixed_matches > 100
     assert all(result_bytes(r) == result_bytes(results[0]) for r in results[1:])
 

@@ -18,7 +18,7 @@ LENGTH = 11.0  # s; the rest at the start is over after four
 THINNING = 3  # every third point, for speed
 
 # Settings that make each estimator quick and still go through all of its parts.
-QUICK = {"continuous": ContinuousSettings(window=3.0, rehearsal=4.0, registration={"max_outer": 2})}
+QUICK = {"continuous": ContinuousSettings(window=3.0, registration={"max_outer": 2})}
 
 
 @pytest.fixture(scope="session")

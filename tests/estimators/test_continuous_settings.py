@@ -11,7 +11,7 @@ from pydantic import ValidationError
 
 from bentwing.estimators.settings import ContinuousSettings, RegistrationSettings, SurfelSettings
 
-QUICK = {"window": 3.0, "rehearsal": 4.0, "registration": {"max_outer": 2}}
+QUICK = {"window": 3.0, "registration": {"max_outer": 2}}
 MODELS = [ContinuousSettings, RegistrationSettings, SurfelSettings]
 NUMBERS = [
     (model, field)

@@ -20,7 +20,7 @@ LENGTH = 12.0  # s; the rest at the start is over after four
 THINNING = 3  # every third point, for speed
 SCAN = 0.025  # s
 # The first four seconds of motion are run twice.
-QUICK = ContinuousSettings(window=3.0, rehearsal=4.0, registration={"max_outer": 2})
+QUICK = ContinuousSettings(window=3.0, registration={"max_outer": 2})
 
 
 def read_flight(folder, length=LENGTH, thinning=THINNING):

@@ -240,28 +240,6 @@ def test_without_points_the_status_says_that_the_imu_is_alone(new, flight):
     assert odometry.pose().predicted > 3.0
 
 
-def test_a_repetition_that_never_catches_up_is_given_up(new, flight, quick, monkeypatch):
-    """As where windows take longer than their data: what was learned stays, and memory is bounded."""
-    step = Continuous._step
-    n_steps = 0
-
-    def starved(self, ready, *, finishing):
-        nonlocal n_steps
-        n_steps += self._ahead is not None
-        return step(self, ready, finishing=finishing) if self._ahead is None else False
-
-    monkeypatch.setattr(Continuous, "_step", starved)
-    odometry = new(settings=quick.model_copy(update={"rehearsal": 1.5}))
-    for piece in flight.pieces:
-        odometry.feed(piece)
-        odometry.wait()
-    assert n_steps > 0
-    assert odometry.status in {"tracking", "degenerate"}
-    assert "could not be repeated within 6 s" in odometry.finish().warnings[-1]
-    first, last = odometry._engine.buffer.lidar_span
-    assert last - first < 8.0
-
-
 def test_a_failure_is_told_to_who_feeds_and_to_who_reads(new, flight, monkeypatch):
     odometry = new()
     for piece in until(flight.pieces, 8.0):

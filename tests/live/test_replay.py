@@ -58,7 +58,7 @@ def test_the_first_pose_comes_with_the_six_seconds_in_which_the_start_is_looked_
     assert 6.0 <= flown.poses[0][0].time <= 6.3
 
 
-def test_poses_stay_young_while_the_first_seconds_are_repeated(flown, quick):
+def test_poses_stay_young(flown, quick):
     """A window of new data, the margin for latencies, and the piece under way."""
     assert max(pose.predicted for pose, _ in flown.poses) <= quick.shift + 0.1 + 0.05
 
@@ -91,9 +91,7 @@ def test_predicted_velocities_are_near_the_true_ones(flown, flight):
 
 
 def test_the_pose_steps_by_no_more_than_what_was_unknown(flown, quick):
-    """Also when the repetition of the first seconds takes over.
-
-    At first gravity is known to 0.02 rad, which leads 0.12 m away within a window's new data and
+    """At first gravity is known to 0.02 rad, which leads 0.12 m away within a window's new data and
     the margin, and half a piece; later the velocity to 3 cm/s. Twice that is allowed.
     """
     pairs = list(pairwise(flown.poses))

@@ -25,6 +25,7 @@ pub(crate) struct SurfelSettings {
     min_planarity: f64,
     min_width_ratio: f64,
     min_width: f64,
+    min_incidence_cosine: f64,
     max_rate: f64,
 }
 
@@ -157,6 +158,7 @@ pub(crate) fn extract_surfels(
         min_planarity: settings.min_planarity,
         min_width_ratio: settings.min_width_ratio,
         min_width: settings.min_width,
+        min_incidence_cosine: settings.min_incidence_cosine,
         max_rate: settings.max_rate,
     };
     let points = Points {
@@ -188,9 +190,9 @@ impl FixedView {
         globals: &Globals,
     ) -> PyResult<Self> {
         let sets: Vec<&SurfelSet> = sets.iter().map(|s| s.0.as_ref()).collect();
-        let (samples, globals) = (&samples.0, &globals.0);
+        let (trajectory, responses, globals) = (&samples.0, &samples.1, &globals.0);
         in_pool(py, 1, || {
-            RustView::freeze(&sets, start, stop, samples, globals)
+            RustView::freeze(&sets, start, stop, trajectory, responses, globals)
         })
         .map(Self)
     }
@@ -209,7 +211,7 @@ impl Registration {
     /// Corrected trajectory.
     #[getter]
     fn samples(&self) -> Samples {
-        Samples(self.0.trajectory.clone())
+        Samples(self.0.trajectory.clone(), self.0.responses.clone())
     }
 
     /// Corrected slow states.
@@ -314,7 +316,7 @@ fn eigenvalues(sum: &Matrix3<f64>, weight: f64) -> [f64; 3] {
 /// Corrects `samples` and `globals` by surfel matches and inertial samples.
 #[pyfunction]
 #[pyo3(signature = (
-    samples, surfels, views, imu, globals, *, information, offset, frozen, clamped, settings,
+    samples, surfels, views, imu, globals, *, information, offset, frozen, joined, settings,
     threads = 0,
 ))]
 #[allow(clippy::too_many_arguments, reason = "the parts of a problem")]
@@ -328,7 +330,7 @@ pub(crate) fn register_window(
     information: PyReadonlyArray2<'_, f64>,
     offset: [f64; N_GLOBALS],
     frozen: [bool; N_GLOBALS],
-    clamped: bool,
+    joined: bool,
     settings: RegistrationSettings,
     threads: usize,
 ) -> PyResult<Registration> {
@@ -346,6 +348,7 @@ pub(crate) fn register_window(
     let imu = imu.map(|imu| &imu.0);
     let problem = Problem {
         trajectory: samples.0.clone(),
+        responses: &samples.1,
         sets: &sets,
         views: &views,
         imu,
@@ -355,8 +358,8 @@ pub(crate) fn register_window(
             offset,
             frozen,
         },
-        initial: if clamped {
-            Initial::Clamped
+        initial: if joined {
+            Initial::Joined
         } else {
             Initial::FirstPose
         },

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! `_core.Samples`, `_core.Imu`, `_core.Globals`: what the estimator carries along.
 
-use bentwing_registration::Globals as RustGlobals;
+use bentwing_registration::{Globals as RustGlobals, N_GLOBALS, PoseResponse, UNMOVED, follow};
 use bentwing_trajectory::{
     Head, Imu as RustImu, Motor, Trajectory, extend_constant_velocity, extend_inertial,
 };
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
-use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, ToPyArray};
+use numpy::{
+    PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, ToPyArray,
+};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -15,9 +17,17 @@ use crate::arrays::{
 };
 use crate::errors::in_pool;
 
-/// Poses of the IMU in the map at a uniform rate.
+/// Poses of the IMU in the map at a uniform rate, and how they follow the calibration.
 #[pyclass(frozen, module = "bentwing._core")]
-pub(crate) struct Samples(pub(crate) Trajectory);
+pub(crate) struct Samples(pub(crate) Trajectory, pub(crate) Vec<PoseResponse>);
+
+impl Samples {
+    /// Poses that nothing but a registration moves.
+    fn unmoved(trajectory: Trajectory) -> Self {
+        let responses = vec![UNMOVED; trajectory.len()];
+        Self(trajectory, responses)
+    }
+}
 
 #[pymethods]
 impl Samples {
@@ -36,7 +46,7 @@ impl Samples {
             .collect();
         let start = finite_number("start", start)?;
         Trajectory::new(start, dt, positions, rotations?)
-            .map(Self)
+            .map(Self::unmoved)
             .map_err(|e| PyValueError::new_err(e.to_string()))
     }
 
@@ -91,7 +101,7 @@ impl Samples {
             self.0.positions()[first..=last].to_vec(),
             self.0.rotations()[first..=last].to_vec(),
         )
-        .map(Self)
+        .map(|trajectory| Self(trajectory, self.1[first..=last].to_vec()))
         .map_err(|e| PyValueError::new_err(e.to_string()))
     }
 
@@ -117,8 +127,9 @@ impl Samples {
         }
         let positions = [&self.0.positions()[..first], newer.0.positions()].concat();
         let rotations = [&self.0.rotations()[..first], newer.0.rotations()].concat();
+        let responses = [&self.1[..first], &newer.1].concat();
         Trajectory::new(self.0.start(), self.0.dt(), positions, rotations)
-            .map(Self)
+            .map(|trajectory| Self(trajectory, responses))
             .map_err(|e| PyValueError::new_err(e.to_string()))
     }
 
@@ -149,7 +160,24 @@ impl Samples {
                 )
             }
         };
-        Ok((Self(trajectory), n_blind))
+        let mut responses = self.1.clone();
+        responses.resize(trajectory.len(), UNMOVED);
+        Ok((Self(trajectory, responses), n_blind))
+    }
+
+    /// These samples where a correction (20,) of the slow states moves them.
+    fn following(&self, correction: [f64; N_GLOBALS]) -> Self {
+        let mut trajectory = self.0.clone();
+        follow(&mut trajectory, &self.1, &correction);
+        Self(trajectory, self.1.clone())
+    }
+
+    /// How each sample follows the slow states (N, 6, 20): derivatives of its rotation, rad, and its
+    /// translation, m, in the map.
+    #[getter]
+    fn responses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        let flat = self.1.as_flattened().as_flattened();
+        flat.to_pyarray(py).reshape([self.1.len(), 6, N_GLOBALS])
     }
 
     /// Lidar points (N, 3) placed in the map.
@@ -262,6 +290,11 @@ impl Globals {
             accel_bias: finite_vector("accel_bias", accel_bias)?,
             gravity: finite_vector("gravity", gravity)?,
         }))
+    }
+
+    /// The correction (20,) that leads from `earlier` to these.
+    fn moved_from(&self, earlier: &Self) -> [f64; N_GLOBALS] {
+        self.0.moved_from(&earlier.0)
     }
 
     /// The same states with gravity straight up.

@@ -139,7 +139,7 @@ impl<'a> MatchRows<'a> {
             views,
             since_views: views
                 .iter()
-                .map(|v| globals.head_moved_from(&v.globals))
+                .map(|v| globals.moved_from(&v.globals))
                 .collect(),
             head: &globals.head,
             matches,
@@ -210,9 +210,11 @@ impl<'a> MatchRows<'a> {
                 residual -= n.dot(&other.mean);
             }
             Target::Fixed(v, j) => {
-                let other = &self.views[v as usize].surfels[j as usize];
+                let view = self.views[v as usize];
+                let other = &view.surfels[j as usize];
                 let mut globals = [0.0; N_GLOBALS];
                 surfel_match::add_globals(&mut globals, self.head, other, n, -1.0);
+                view.add_pose_response(&mut globals, j as usize, n, -1.0);
                 residual -= n.dot(&other.mean);
                 let since = &self.since_views[v as usize];
                 for ((to, g), moved) in sum.globals_mut().iter_mut().zip(globals).zip(since) {

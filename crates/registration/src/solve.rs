@@ -8,8 +8,10 @@ mod sparse;
 use faer::Mat;
 use faer::linalg::solvers::Solve;
 use faer::sparse::linalg::solvers::Llt as SparseLlt;
+use nalgebra::DMatrix;
 use thiserror::Error;
 
+use crate::response::{PoseResponse, UNMOVED};
 use crate::{GlobalMatrix, GlobalVector, N_GLOBALS, NormalEquations};
 use dense::DenseLlt;
 use layout::Layout;
@@ -46,6 +48,25 @@ pub struct Solution {
     pub globals: GlobalVector,
 }
 
+/// What a system says of the global states when everything else is at its best.
+#[derive(Clone, Debug)]
+pub struct Marginals {
+    /// Covariance of the global states; zero where frozen.
+    pub covariance: GlobalMatrix,
+    /// How the control points follow them.
+    pub responses: Vec<PoseResponse>,
+}
+
+impl Marginals {
+    /// Of a system that was never solved.
+    pub fn unknown(n_controls: usize) -> Self {
+        Self {
+            covariance: GlobalMatrix::zeros(),
+            responses: vec![UNMOVED; n_controls],
+        }
+    }
+}
+
 enum Factor {
     Dense(DenseLlt),
     Sparse(SparseLlt<usize, f64>),
@@ -76,8 +97,8 @@ pub struct Factorized {
 }
 
 impl Solver {
-    /// Factorizes `equations` without the first `n_clamped` control points, which stay zero, and
-    /// without the frozen global states.
+    /// Factorizes `equations` without the first `n_clamped` control points, which are no
+    /// unknowns, and without the frozen global states.
     ///
     /// # Errors
     /// When the equations are singular (with the name of the unknown) or not finite.
@@ -172,8 +193,10 @@ impl Factorized {
         Solution { knots, globals }
     }
 
-    /// Covariance of the global states; zero where frozen.
-    pub fn global_covariance(&self) -> GlobalMatrix {
+    /// What the system says of the global states, and how the control points go with them.
+    ///
+    /// `ties` are the responses of the clamped control points.
+    pub fn marginals(&self, ties: &[PoseResponse]) -> Marginals {
         let (n, first) = (self.layout.len(), self.layout.n_knot_unknowns());
         let active = &self.layout.active;
         let mut units = Mat::<f64>::zeros(n, active.len());
@@ -187,7 +210,43 @@ impl Factorized {
                 covariance[(a, b)] = 0.5 * (inverse[(first + i, j)] + inverse[(first + j, i)]);
             }
         }
-        covariance
+        Marginals {
+            responses: self.responses(&inverse, &covariance, ties),
+            covariance,
+        }
+    }
+
+    /// `Σ_cg Σ_gg⁻¹` of control points c and global states g.
+    fn responses(
+        &self,
+        inverse: &Mat<f64>,
+        covariance: &GlobalMatrix,
+        ties: &[PoseResponse],
+    ) -> Vec<PoseResponse> {
+        let active = &self.layout.active;
+        let mut responses = vec![UNMOVED; self.layout.n_controls];
+        for (response, tie) in responses.iter_mut().zip(ties) {
+            *response = *tie;
+        }
+        let n = active.len();
+        let among = DMatrix::from_fn(n, n, |i, j| covariance[(active[i], active[j])]);
+        // Positive definite as the system is; were it not, poses that stay are the safe answer.
+        let Some(information) = among.cholesky().map(|c| c.inverse()) else {
+            return responses;
+        };
+        for (k, response) in responses.iter_mut().enumerate() {
+            let Some(first) = self.layout.knot(k) else {
+                continue;
+            };
+            for (i, row) in response.iter_mut().enumerate() {
+                for (j, &g) in active.iter().enumerate() {
+                    row[g] = (0..n)
+                        .map(|h| inverse[(first + i, h)] * information[(h, j)])
+                        .sum();
+                }
+            }
+        }
+        responses
     }
 }
 
@@ -220,5 +279,7 @@ fn singular(equations: &NormalEquations, layout: &Layout) -> SolveError {
     }
 }
 
+#[cfg(test)]
+pub mod testing;
 #[cfg(test)]
 mod tests;

@@ -10,7 +10,8 @@ use nalgebra::Vector3;
 use crate::constraints::{imu, initial, motion, prior, velocity};
 use crate::matches::{self, MatchRows};
 use crate::placed::Placed;
-use crate::solve::{Factorized, Solution, SolveError, Solver};
+use crate::response::{self, PoseResponse};
+use crate::solve::{Factorized, Marginals, Solution, SolveError, Solver};
 use crate::{
     FixedView, GlobalMatrix, GlobalPrior, GlobalVector, Globals, Health, NormalEquations, Settings,
 };
@@ -18,9 +19,9 @@ use crate::{
 /// How the start of the trajectory is held.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Initial {
-    /// The first three control points stay zero: the corrected trajectory joins the frozen past
-    /// with continuous velocity and acceleration.
-    Clamped,
+    /// The first three control points are no unknowns: the corrected trajectory joins the past with
+    /// continuous velocity and acceleration.
+    Joined,
     /// Only the first pose stays; there is no past.
     FirstPose,
 }
@@ -29,6 +30,9 @@ pub enum Initial {
 pub struct Problem<'a> {
     /// Prior trajectory.
     pub trajectory: Trajectory,
+    /// How its samples follow the calibration so far; only those at the start matter, where it
+    /// joins the past. Without any the past stays.
+    pub responses: &'a [PoseResponse],
     /// Surfels of the trajectory.
     pub sets: &'a [Arc<SurfelSet>],
     /// Surfels of final poses.
@@ -48,6 +52,8 @@ pub struct Problem<'a> {
 pub struct Registration {
     /// Corrected trajectory.
     pub trajectory: Trajectory,
+    /// How its samples follow the global states.
+    pub responses: Vec<PoseResponse>,
     /// Corrected global states.
     pub globals: Globals,
     /// Covariance of the global states; zero where frozen.
@@ -75,6 +81,7 @@ pub fn register_window(
     settings: &Settings,
 ) -> Result<Registration, SolveError> {
     let mut state = State::new(problem, settings);
+    let ties = state.ties(problem);
     let mut solver = Solver::default();
     let (mut step_size, mut n_outer) = (StepSize::UNKNOWN, 0);
     let (mut matches, mut last) = (Vec::new(), None);
@@ -99,13 +106,9 @@ pub fn register_window(
         for _ in 0..settings.n_inner {
             let mut equations = fixed_rows.clone();
             let health = rows.add(&mut equations, step.as_ref(), scale);
-            let n_clamped = if problem.initial == Initial::Clamped {
-                3
-            } else {
-                0
-            };
-            let factorized = solver.factorize(&equations, n_clamped, &problem.prior.frozen)?;
-            step = Some(factorized.solve());
+            response::tie(&mut equations, &ties);
+            let factorized = solver.factorize(&equations, ties.len(), &problem.prior.frozen)?;
+            response::complete(step.insert(factorized.solve()), &ties);
             last = Some((factorized, health, placed.surfels.len()));
         }
         if let Some(step) = step {
@@ -113,7 +116,7 @@ pub fn register_window(
         }
         n_outer += 1;
     }
-    Ok(state.finish(last, n_outer, step_size.converged(settings)))
+    Ok(state.finish(last, &ties, n_outer, step_size.converged(settings)))
 }
 
 /// The normal equations of the first iteration, for those who study how to solve them.
@@ -174,6 +177,16 @@ impl State {
         }
     }
 
+    /// How the control points that join the past follow the calibration.
+    fn ties(&self, problem: &Problem<'_>) -> Vec<PoseResponse> {
+        match problem.initial {
+            Initial::FirstPose => Vec::new(),
+            Initial::Joined => {
+                response::joined(problem.responses, &self.trajectory, &self.spline).to_vec()
+            }
+        }
+    }
+
     /// The rows whose weights do not change in the inner iterations.
     fn fixed_rows(&mut self, problem: &Problem<'_>, settings: &Settings) -> NormalEquations {
         let mut equations = NormalEquations::new(self.spline.n_controls());
@@ -223,17 +236,23 @@ impl State {
     fn finish(
         self,
         last: Option<(Factorized, Health, usize)>,
+        ties: &[PoseResponse],
         n_outer: usize,
         converged: bool,
     ) -> Registration {
-        let (covariance, health, n_surfels) = match last {
-            Some((f, health, n)) => (f.global_covariance(), health, n),
-            None => (GlobalMatrix::zeros(), Health::default(), 0),
+        let (marginals, health, n_surfels) = match last {
+            Some((f, health, n)) => (f.marginals(ties), health, n),
+            None => (
+                Marginals::unknown(self.spline.n_controls()),
+                Health::default(),
+                0,
+            ),
         };
         Registration {
+            responses: response::at_samples(&marginals.responses, &self.trajectory, &self.spline),
             trajectory: self.trajectory,
             globals: self.globals,
-            covariance,
+            covariance: marginals.covariance,
             offset: self.moved,
             health,
             n_surfels,

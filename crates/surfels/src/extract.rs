@@ -48,6 +48,9 @@ pub struct Settings {
     /// Least `√λ2` in units of the voxel size; rejects single scan lines, whose normal is free
     /// to turn about the line.
     pub min_width: f64,
+    /// Least cosine between normal and ray. What looks like a surface seen edge-on is the plane of
+    /// the scan itself, bent at a corner or about a trunk.
+    pub min_incidence_cosine: f64,
     /// Most surfels per second of data.
     pub max_rate: f64,
 }
@@ -289,15 +292,15 @@ fn push_surfel(
     let t_map_lidar = pose.p + pose.R * t_imu_lidar;
     let mean = R_lidar_map * (moments.mean() + origin - t_map_lidar);
     let normal = R_lidar_map * eigen.normal;
+    let away = normal.dot(&mean);
+    if away.abs() < settings.min_incidence_cosine * mean.norm() {
+        return false;
+    }
     set.means.push(mean);
     set.covariances
         .push(R_lidar_map * covariance * R_lidar_map.transpose());
     // Turned to the sensor: otherwise thin walls match front to back.
-    set.normals.push(if normal.dot(&mean) > 0.0 {
-        -normal
-    } else {
-        normal
-    });
+    set.normals.push(if away > 0.0 { -normal } else { normal });
     set.stamps.push(stamp);
     set.angles.push(angle);
     set.n_points.push(moments.n());

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""The first poses and slow states of a pass: at rest, in motion, rehearsed, or after a break."""
+"""The first poses and slow states of a pass: at rest, in motion, or after a break."""
 
 from __future__ import annotations
 
@@ -18,8 +18,6 @@ from bentwing.estimators.slow_states import SlowStatePrior, initial_std
 from bentwing.estimators.start import STANDARD_GRAVITY, attitude_of
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from bentwing.estimators.core_settings import CoreSettings
     from bentwing.estimators.mount import Mount
     from bentwing.estimators.settings import ContinuousSettings
@@ -40,31 +38,27 @@ class Situation:
 
 
 def begin_pass(
-    situation: Situation,
-    start: Start,
-    first: float,
-    rehearsed: OdometryPass | None,
-    *,
-    keep: bool,
-    before: OdometryPass | None,
+    situation: Situation, start: Start, first: float, before: OdometryPass | None
 ) -> OdometryPass:
     """Return a pass with its first samples and what is known of the slow states.
 
     Parameters
     ----------
     first : time of the first sample, s
-    rehearsed : an earlier pass over the same seconds
-    keep : whether what it has learned of the slow states is worth keeping
     before : the pass up to the last break
     """
-    known = rehearsed if keep and rehearsed is not None else before
-    slow = _described(situation, start) if known is None else known.globals.levelled()
-    if rehearsed is not None and keep and start.static is not None:
-        prior = deepcopy(rehearsed.prior)  # the rehearsed pass may go on
-        prior.recentre("gravity")
-    else:
-        prior = _prior(situation, start, before)
-    positions, quats = _first_poses(start, first, rehearsed, slow)
+    slow = _described(situation, start) if before is None else before.globals.levelled()
+    prior = _prior(situation, start, before)
+    quat = start.quat_xyzw
+    if start.static is not None:
+        quat = attitude_of(start.static.accel_mean - slow.accel_bias)
+        prior.observe_rest(quat, start.static.accel_std)
+    n = max(2, int((start.hold - first) / DT) + 1)
+    turns = geometry.exp(DT * np.arange(n)[:, None] * start.rate)
+    positions, quats = (
+        np.zeros((n, 3)),
+        geometry.multiply(np.broadcast_to(quat, turns.shape), turns),
+    )
     if before is not None:
         at, quat = extrapolated(before.trajectory(), first)
         turn = heading(geometry.multiply(quat, geometry.inverse(quats[0])))
@@ -108,17 +102,3 @@ def _prior(situation: Situation, start: Start, before: OdometryPass | None) -> S
     if start.static is not None:
         prior.reset("gyro_bias", start.static.gyro_bias_std)
     return prior
-
-
-def _first_poses(
-    start: Start, first: float, rehearsed: OdometryPass | None, slow: _core.Globals
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the rest at the start, or the first two poses of a start in motion, from the origin."""
-    if start.static is None and rehearsed is not None:
-        known = rehearsed.trajectory()
-        return known.positions[:2] - known.positions[0], known.quats_xyzw[:2]
-    n = max(2, int((start.hold - first) / DT) + 1)
-    quat = start.quat_xyzw
-    if start.static is not None:
-        quat = attitude_of(start.static.accel_mean - slow.accel_bias)
-    return np.zeros((n, 3)), np.repeat(quat[None], n, axis=0)

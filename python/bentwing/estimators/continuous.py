@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from bentwing.errors import EstimationError, NotEnoughDataError
+from bentwing.errors import NotEnoughDataError
 from bentwing.estimators.beginning import Situation, begin_pass
 from bentwing.estimators.buffer import BatchBuffer
 from bentwing.estimators.core_settings import CoreSettings
@@ -22,22 +22,13 @@ if TYPE_CHECKING:
 
 # A rest shorter than this is waited out before the start is judged, s.
 LOOK_AHEAD = 6.0
-# Where data comes faster than it is registered, the repetition is given up this many rehearsals
-# after the start: what was learned is used all the same, and the buffer must not grow.
-LATEST_REPETITION = 4.0
-# Final poses partly hold the calibration at the value they were estimated with, so that one
-# rehearsal leaves some of the payload's error, and a second one less.
-REPETITIONS = 2
-# A start in motion is rehearsed over these stretches first, s: velocity, then attitude.
-MOVING_REHEARSALS = (2.0, 5.0)
 
 
 class Continuous:
     """Continuous-time surfel odometry; feed batches in time order, then ask for the result.
 
-    The first seconds are rehearsed: run twice to learn the calibration, then again with it, since
-    latency, extrinsics and accelerometer bias cannot be known before the payload has turned. A
-    start in motion is rehearsed over longer and longer stretches, to learn velocity and attitude.
+    Latency, extrinsics and accelerometer bias cannot be known before the payload has turned. What was
+    estimated until then follows them when they become known, see `OdometryPass`.
     """
 
     def __init__(
@@ -56,9 +47,6 @@ class Continuous:
         self._start: Start | None = None
         self._first = 0.0
         self._pass: OdometryPass | None = None
-        # A rehearsed pass, until the pass that repeats it has caught up.
-        self._ahead: OdometryPass | None = None
-        self._rehearsals: tuple[float, ...] = ()
         # What came before the last break.
         self._before: list[OdometryPass] = []
         # The pass as it was at a break, while it is not known whether it can be continued.
@@ -77,22 +65,12 @@ class Continuous:
     def step(self, *, finishing: bool = False) -> OdometryPass | None:
         """Register one window that has become complete; returns its pass, None without any.
 
-        While a rehearsal is repeated, the rehearsed pass goes on first, so that the newest pose
-        never becomes old. The result is that of `feed`; `finishing` as `result` does.
+        The result is that of `feed`; `finishing` as `result` does.
         """
-        ready = self._ready_until(finishing=finishing)
-        if ready is None or (self._start is None and not self._begin(ready, finishing=finishing)):
-            return None
-        ahead, shift = self._ahead, self._sliding.shift
-        if ahead is not None and ahead.end + shift <= ready:
-            try:
-                ahead.step(self._buffer, ahead.end + shift)
-            except EstimationError:  # what counts is the pass that follows
-                self._ahead = None
-            else:
-                self._give_up_repeating(ahead)
-                return ahead
-        return self._pass if self._step(ready, finishing=finishing) else None
+        while self._go_on(finishing=finishing):
+            if self._pass is not None:
+                return self._pass
+        return None
 
     def result(self) -> Estimate:
         """Finish with what was fed so far.
@@ -130,14 +108,9 @@ class Continuous:
         return self.estimate(done)
 
     @property
-    def passes(self) -> list[OdometryPass]:
-        """The passes that are under way, the newest pose first."""
-        return [p for p in (self._ahead, self._pass) if p is not None]
-
-    @property
-    def rehearsing(self) -> bool:
-        """Whether the first seconds are still to be repeated, or being repeated."""
-        return bool(self._rehearsals) or self._ahead is not None
+    def current(self) -> OdometryPass | None:
+        """The pass that is under way."""
+        return self._pass
 
     @property
     def buffer(self) -> BatchBuffer:
@@ -145,11 +118,15 @@ class Continuous:
         return self._buffer
 
     def _advance(self, *, finishing: bool) -> None:
-        while (ready := self._ready_until(finishing=finishing)) is not None:
-            if self._start is None and not self._begin(ready, finishing=finishing):
-                return
-            if not self._step(ready, finishing=finishing):
-                return
+        while self._go_on(finishing=finishing):
+            pass
+
+    def _go_on(self, *, finishing: bool) -> bool:
+        """Do what can be done next: begin, register a window, pass a break; returns whether so."""
+        ready = self._ready_until(finishing=finishing)
+        if ready is None or (self._start is None and not self._begin(ready, finishing=finishing)):
+            return False
+        return self._step(ready, finishing=finishing)
 
     def _ready_until(self, *, finishing: bool) -> float | None:
         """Return the time up to which lidar and IMU data are complete, s."""
@@ -178,13 +155,10 @@ class Continuous:
             if still_resting and not finishing:
                 return False
             self._start = start
-            if self.settings.rehearsal > 0:
-                short = () if start.static is not None else MOVING_REHEARSALS
-                self._rehearsals = (*short, *REPETITIONS * (self.settings.rehearsal,))
-        self._pass = self._new_pass(self._start, None)
+        self._pass = self._new_pass(self._start)
         return True
 
-    def _new_pass(self, start: Start, rehearsed: OdometryPass | None) -> OdometryPass:
+    def _new_pass(self, start: Start) -> OdometryPass:
         begun = begin_pass(
             Situation(
                 self._payload,
@@ -196,9 +170,6 @@ class Continuous:
             ),
             start,
             self._first,
-            rehearsed,
-            # What a short rehearsal says of the biases is not worth keeping.
-            keep=len(self._rehearsals) < REPETITIONS,
             before=self._before[-1] if self._before else None,
         )
         if start.static is not None and self.settings.n_views:
@@ -207,17 +178,11 @@ class Continuous:
 
     def _step(self, ready: float, *, finishing: bool) -> bool:
         """Register the next window if its data is complete; returns whether it was."""
-        current, start, broken = self._pass, self._start, self._break_until(ready)
-        if current is None or start is None:
+        current, broken = self._pass, self._break_until(ready)
+        if current is None:
             return False
         if broken is not None:
             ready, finishing = broken.start, True
-        if self._rehearsals:
-            rehearsed = current.end - start.hold >= self._rehearsals[0]
-            if rehearsed or (finishing and ready - current.end < DT):
-                self._rehearsals = self._rehearsals[1:]
-                self._ahead = self._ahead or current
-                self._pass = current = self._new_pass(start, current)
         end = current.end + self._sliding.shift
         if end > ready:
             if not finishing:
@@ -226,8 +191,6 @@ class Continuous:
                 return self._judge_bridge() or self._bridge(current, broken)
             end = ready
         current.step(self._buffer, end)
-        if self._ahead is not None and current.end >= self._ahead.end:
-            self._ahead = None
         self._settle(end)
         return True
 
@@ -235,7 +198,7 @@ class Continuous:
         """Judge a bridge when enough was seen behind it, and forget what no window needs."""
         if self._bridged is not None and end >= self._bridged[1].stop + JUDGED[1]:
             self._judge_bridge()
-        elif not self._rehearsals:
+        else:
             needed = end if self._bridged is None else self._bridged[1].start
             self._buffer.forget(needed - self._sliding.window - 1.0)
 
@@ -263,19 +226,8 @@ class Continuous:
         self._buffer.cut(broken.stop)
         if before.windows:
             self._before.append(before)
-        self._start = self._pass = self._ahead = None
-        self._rehearsals = ()
+        self._start = self._pass = None
         return True
-
-    def _give_up_repeating(self, ahead: OdometryPass) -> None:
-        longest = LATEST_REPETITION * self.settings.rehearsal
-        if self._start is None or ahead.end - self._start.hold < longest:
-            return
-        self._pass, self._ahead, self._rehearsals = ahead, None, ()
-        self._notes.append(
-            f"the first {self.settings.rehearsal:g} s could not be repeated within {longest:g} s: "
-            "windows take too long here; give fewer points or a larger shift"
-        )
 
     def estimate(self, last: OdometryPass) -> Estimate:
         """Return what the passes before the last break and this one say, levelled."""

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bentwing import _core, geometry
+from bentwing.estimators.final_poses import FinalPoses
 from bentwing.estimators.slow_states import SlowStatePrior, named_std
 from bentwing.estimators.start import levelling
 from bentwing.estimators.views import FixedViews
@@ -65,7 +66,7 @@ class OdometryPass:
         self._anchor = samples.end if resting else samples.start
         self._surfels: list[tuple[float, _core.Surfels]] = []
         self._views = FixedViews(settings)
-        self._finished: list[tuple[NDArray[np.float64], NDArray[np.float64]]] = []
+        self._finished: list[FinalPoses] = []
         self._end = samples.end
         self.covariance = np.zeros((20, 20))
         self.timings = {"propagate": 0.0, "surfels": 0.0, "register": 0.0}
@@ -74,6 +75,11 @@ class OdometryPass:
     def end(self) -> float:
         """Stamp up to which lidar data was used, s."""
         return self._end
+
+    @property
+    def is_settling(self) -> bool:
+        """Whether its windows have not yet reached their full length."""
+        return self._end - self._anchor < self._settings.window
 
     def look_around(self, buffer: BatchBuffer) -> None:
         """Freeze what was seen at rest; a 2D lidar sees no surfels then, a 3D lidar its first view."""
@@ -100,7 +106,8 @@ class OdometryPass:
 
     def trajectory(self) -> Trajectory:
         """Return all samples so far, levelled."""
-        parts = [*self._finished, (self.samples.positions, self.samples.quats_xyzw)]
+        finished = [f.by(self.globals) for f in self._finished]
+        parts = [*finished, (self.samples.positions, self.samples.quats_xyzw)]
         positions, quats = zip(*parts, strict=True)
         return self._levelled(self._origin, np.concatenate(positions), np.concatenate(quats))
 
@@ -156,7 +163,7 @@ class OdometryPass:
         start = self._window_start(self._end)
         first = max(0, round((start - self.samples.start) / DT))
         window = self.samples.slice(first, len(self.samples) - 1)
-        clamped = self._resting or start > self._origin
+        joined = self._resting or start > self._origin
         result = _core.register_window(
             window,
             [s for t, s in self._surfels if t >= start - 1e-6],
@@ -166,11 +173,13 @@ class OdometryPass:
             information=self.prior.information,
             offset=self.prior.offset,
             frozen=self.prior.frozen.tolist(),
-            clamped=clamped,
+            joined=joined,
             settings=self._core,
             threads=self._threads,
         )
-        self.samples = self.samples.replaced(first, result.samples)
+        # What is final follows what the window has told of the calibration.
+        moved = result.globals.moved_from(self.globals)
+        self.samples = self.samples.following(moved).replaced(first, result.samples)
         self.globals = result.globals
         self.covariance = self.prior.discounted(result.covariance)
         length = self._end - start
@@ -214,8 +223,7 @@ class OdometryPass:
         self._surfels = [(t, s) for t, s in self._surfels if t >= oldest]
         n = round((oldest - self.samples.start) / DT)
         if n > 1000:
-            positions, quats = self.samples.positions, self.samples.quats_xyzw
-            self._finished.append((positions[:n], quats[:n]))
+            self._finished.append(FinalPoses(self.samples, n, self.globals))
             self.samples = self.samples.slice(n, len(self.samples) - 1)
 
     def _lap(self, name: str, since: float) -> float:

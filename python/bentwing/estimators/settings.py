@@ -25,6 +25,9 @@ class SurfelSettings(_Section):
     min_width: float = Field(
         0.05, ge=0, description="sqrt(l2) in voxels; rejects single scan lines"
     )
+    min_incidence_cosine: float = Field(
+        0.1, ge=0, lt=1, description="between normal and ray; rejects the plane of the scan itself"
+    )
     max_rate: float = Field(2000.0, gt=0, description="most surfels per second of data")
 
 
@@ -57,11 +60,6 @@ class ContinuousSettings(_Section):
         0.2,
         gt=0,
         description="new data per step without an IMU, s: how long velocities are extrapolated",
-    )
-    rehearsal: float = Field(
-        10.0,
-        ge=0,
-        description="seconds after the start that are run twice more, for the calibration; 0: never",
     )
     view_length: float = Field(1.5, gt=0, description="of a fixed view, s")
     view_distance: float = Field(1.5, gt=0, description="motion that renews the fixed views, m")

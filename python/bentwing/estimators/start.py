@@ -23,6 +23,8 @@ STANDARD_GRAVITY = 9.80665
 # A start in motion takes its first attitude from the mean force over this time, s: long enough
 # for the accelerations of a flight to average out.
 MOVING_MEAN = 1.0
+# Its first turn is that of the gyro's samples of this time, s.
+FIRST_RATE = 0.02
 # A motion may begin too softly to be noticed: the last part of a rest is estimated, not held, s.
 LATE_HOLD = 0.5
 
@@ -35,12 +37,14 @@ class Start:
     ----------
     static : what the rest at the start has told, or None
     quat_xyzw : (4,) attitude of the first pose, yaw zero
+    rate : (3,) rad/s, of the first pose, imu frame
     gyro_bias, accel_bias : (3,) rad/s, m/s²
     hold : s, the pose stays the first one until this time
     """
 
     static: StaticStart | None
     quat_xyzw: NDArray[np.float64]
+    rate: NDArray[np.float64]
     gyro_bias: NDArray[np.float64]
     accel_bias: NDArray[np.float64]
     hold: float
@@ -48,7 +52,8 @@ class Start:
 
 def level_start(time: float) -> Start:
     """Return the start of a recording without IMU: the first pose is the map."""
-    return Start(None, np.array([0.0, 0.0, 0.0, 1.0]), np.zeros(3), np.zeros(3), time)
+    level = np.array([0.0, 0.0, 0.0, 1.0])
+    return Start(None, level, np.zeros(3), np.zeros(3), np.zeros(3), time)
 
 
 def find_start(imu: ImuBatch, noise: Imu) -> Start:
@@ -63,12 +68,13 @@ def find_start(imu: ImuBatch, noise: Imu) -> Start:
     if static is None:
         first = imu.times < imu.times[0] + MOVING_MEAN
         up = imu.accel[first].mean(axis=0)
-        return Start(None, attitude_of(up), np.zeros(3), np.zeros(3), float(imu.times[0]))
+        rate = imu.gyro[imu.times < imu.times[0] + FIRST_RATE].mean(axis=0)
+        return Start(None, attitude_of(up), rate, np.zeros(3), np.zeros(3), float(imu.times[0]))
     # Only the part of the bias along gravity shows at rest; the rest is in the attitude.
     force = static.accel_mean
     bias = force * (1.0 - STANDARD_GRAVITY / float(np.linalg.norm(force)))
     hold = max(static.start, static.end - LATE_HOLD)
-    return Start(static, attitude_of(force), static.gyro_bias, bias, hold)
+    return Start(static, attitude_of(force), np.zeros(3), static.gyro_bias, bias, hold)
 
 
 def attitude_of(force: NDArray[np.float64]) -> NDArray[np.float64]:

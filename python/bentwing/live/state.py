@@ -29,12 +29,10 @@ class Registered:
     ----------
     done : the pass as it was then
     cloud : the map of its pass
-    rehearsing : whether the first seconds are still to be repeated
     """
 
     done: OdometryPass
     cloud: LiveMap
-    rehearsing: bool
     prediction: Prediction = field(init=False)
 
     def __post_init__(self) -> None:
@@ -67,7 +65,7 @@ class LiveState:
                 self._imu.forget(self._imu.end - REST - 1.0)
 
     def publish(self, registered: Registered) -> None:
-        """Go on from a newer window from now on; an older one, as of a repetition, is passed over."""
+        """Go on from a newer window from now on; an older one, as behind a break, is passed over."""
         with self._lock:
             before = self._newest
             if before is not None and registered.done.end < before.done.end:

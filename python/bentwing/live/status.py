@@ -27,6 +27,6 @@ def status_of(newest: Registered | None, age: float, shift: float) -> Status:
         return "waiting"
     if age > 2 * shift + COASTING:
         return "coasting"
-    if newest.rehearsing:
+    if newest.done.is_settling:
         return "initializing"
     return "degenerate" if newest.done.windows[-1]["degenerate"] else "tracking"

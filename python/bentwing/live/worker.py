@@ -45,7 +45,8 @@ class Worker:
         self._preprocessing = preprocessing
         self._state = state
         self._new_map = new_map
-        self._maps: dict[OdometryPass, LiveMap] = {}
+        self._mapped: OdometryPass | None = None
+        self._cloud = new_map()
         self._searched = -float("inf")
         self._queue: deque[Batch] = deque()
         self._changed = Condition()
@@ -134,7 +135,7 @@ class Worker:
                 self._engine.take(usable)
 
     def _register(self, *, finishing: bool = False) -> None:
-        if not finishing and not self._engine.passes and not self._search():
+        if not finishing and self._engine.current is None and not self._search():
             return
         while not self._stopping and (done := self._engine.step(finishing=finishing)) is not None:
             self._publish(done)
@@ -152,8 +153,7 @@ class Worker:
         return True
 
     def _publish(self, done: OdometryPass) -> None:
-        passes = self._engine.passes
-        self._maps = {p: self._maps.get(p) or self._new_map() for p in passes}
-        cloud = self._maps[done]
-        cloud.add(done, self._engine.buffer)
-        self._state.publish(Registered(done.snapshot(), cloud, self._engine.rehearsing))
+        if self._mapped is not self._engine.current:
+            self._mapped, self._cloud = self._engine.current, self._new_map()
+        self._cloud.add(done, self._engine.buffer)
+        self._state.publish(Registered(done.snapshot(), self._cloud))

@@ -15,6 +15,7 @@ fn settings() -> Settings {
         min_planarity: 0.3,
         min_width_ratio: 0.03,
         min_width: 0.05,
+        min_incidence_cosine: 0.1,
         max_rate: f64::INFINITY,
     }
 }
@@ -53,6 +54,39 @@ fn wall(trajectory: &Trajectory, head: &Head) -> (Vec<[f64; 3]>, Vec<f64>) {
         out.1.push(stamp);
     }
     out
+}
+
+/// A corner of two walls is flat in the plane of a scan that does not move: that is no surface.
+#[test]
+fn the_plane_of_a_resting_scan_is_no_surfel() {
+    let trajectory = Trajectory::new(
+        -0.05,
+        0.01,
+        vec![Vector3::zeros(); 121],
+        vec![nalgebra::UnitQuaternion::identity(); 121],
+    );
+    let head = Head {
+        latency: 0.0,
+        ..head()
+    };
+    let corner = (0..600).map(|i| {
+        let along = 0.004 * f64::from(i % 100 - 50);
+        [4.0 - along.max(0.0), 2.0 + along.min(0.0), 0.0]
+    });
+    let points: Vec<_> = corner.collect();
+    let stamps: Vec<_> = (0..600).map(|i| 0.0003 * f64::from(i)).collect();
+    let points = Points {
+        points: &points,
+        stamps: &stamps,
+        angles: &[],
+    };
+    let anything = Settings {
+        min_incidence_cosine: 0.0,
+        ..settings()
+    };
+    let trajectory = trajectory.unwrap();
+    assert!(!extract(points, &trajectory, &head, &anything).is_empty());
+    assert!(extract(points, &trajectory, &head, &settings()).is_empty());
 }
 
 #[test]

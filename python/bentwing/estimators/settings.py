@@ -28,7 +28,7 @@ class SurfelSettings(_Section):
     min_incidence_cosine: float = Field(
         0.1, ge=0, lt=1, description="between normal and ray; rejects the plane of the scan itself"
     )
-    max_rate: float = Field(2000.0, gt=0, description="most surfels per second of data")
+    max_rate: float = Field(1500.0, gt=0, description="most surfels per second of data")
 
 
 class RegistrationSettings(_Section):
@@ -42,8 +42,8 @@ class RegistrationSettings(_Section):
     cauchy_scale: float = Field(1.0, gt=0, description="later outer iterations, sigmas")
     max_outer: int = Field(20, ge=1, description="a window that follows a gap needs many")
     n_inner: int = Field(1, ge=1)
-    min_translation: float = Field(1e-3, gt=0, description="smaller steps end the iterations, m")
-    min_rotation: float = Field(1e-4, gt=0, description="smaller steps end the iterations, rad")
+    min_translation: float = Field(2e-3, gt=0, description="smaller steps end the iterations, m")
+    min_rotation: float = Field(2e-4, gt=0, description="smaller steps end the iterations, rad")
     velocity_sigma: float = Field(0.5, gt=0, description="deviation from the prior, m/s")
     rate_sigma: float = Field(0.5, gt=0, description="deviation from the prior, rad/s")
     motion_accel_density: float = Field(1.5, gt=0, description="without IMU, m/s²/√Hz")

@@ -12,13 +12,15 @@ from bentwing.recording.batches import EncoderBatch, LidarBatch
 
 if TYPE_CHECKING:
     from collections import Counter
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Generator, Iterable, Iterator
 
     from bentwing.recording.batches import Batch
     from bentwing.recording.payload import Payload
 
 
-def preprocess(batches: Iterable[Batch], payload: Payload, counts: Counter[str]) -> Iterator[Batch]:
+def preprocess(
+    batches: Iterable[Batch], payload: Payload, counts: Counter[str]
+) -> Generator[Batch, None, None]:
     """Filter lidar returns by range and self-hits, and attach the encoder's angles.
 
     Parameters

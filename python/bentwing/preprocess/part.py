@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from bentwing.preprocess.chain import preprocess
+from bentwing.preprocess.read_ahead import read_ahead
 
 if TYPE_CHECKING:
     from collections import Counter
@@ -14,6 +15,9 @@ if TYPE_CHECKING:
 
     from bentwing.progress import Stage
     from bentwing.recording import Batch, Payload, Recording
+
+# A few seconds of a lidar: reading goes on while a window is registered.
+BATCHES_AHEAD = 32
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +50,7 @@ class RecordingPart:
         """
         reached = self.start or 0.0
         stream = self.recording.batches(self.start, self.duration)
-        for batch in preprocess(stream, self.payload, counts):
+        for batch in read_ahead(preprocess(stream, self.payload, counts), BATCHES_AHEAD):
             yield batch
             if len(batch.times) and batch.times[-1] > reached:
                 shown.advance(float(batch.times[-1]) - reached)

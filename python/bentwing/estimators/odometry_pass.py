@@ -33,6 +33,8 @@ MIN_EIGENVALUE = 0.02
 class OdometryPass:
     """Runs windows over the data as it comes; holds only what the next window needs.
 
+    Poses that have left the window follow what later ones tell of the slow states.
+
     Attributes
     ----------
     samples : dense trajectory from a few seconds before the window to its end
@@ -177,7 +179,6 @@ class OdometryPass:
             settings=self._core,
             threads=self._threads,
         )
-        # What is final follows what the window has told of the calibration.
         moved = result.globals.moved_from(self.globals)
         self.samples = self.samples.following(moved).replaced(first, result.samples)
         self.globals = result.globals

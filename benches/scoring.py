@@ -149,7 +149,9 @@ def best_points(
     step = max(1, np.count_nonzero(flown) // MAP_SAMPLE)
     chosen = np.flatnonzero(flown)[::step]
     if "encoder" in true:
-        angles = np.concatenate([b.angles for b in lidar])[chosen] + true["encoder_zero"]
+        # Read at the stamps of the lidar; the motor was there at the true times.
+        read = np.unwrap(np.concatenate([b.angles for b in lidar]))
+        angles = np.interp(times[chosen], times + true["latency"], read) + true["encoder_zero"]
         in_motor = moved_by(true["encoder"]["T_motor_lidar"], points[chosen])
         turns = geometry.exp(angles[:, None] * np.array(payload.encoder.axis))
         in_imu = moved_by(true["encoder"]["T_imu_motor"], geometry.rotate(turns, in_motor))

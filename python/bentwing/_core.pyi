@@ -213,9 +213,8 @@ class Samples:
     def following(self, correction: Sequence[float]) -> Samples:
         """Return these samples where a correction (20,) of the slow states moves them."""
 
-    @property
-    def responses(self) -> NDArray[np.float64]:
-        """How they follow the slow states (N, 6, 20): derivatives of `[δr, δt]`, rad and m, map frame."""
+    def responses_at(self, samples: Sequence[int]) -> NDArray[np.float64]:
+        """How samples follow the slow states (K, 6, 20): `[δr, δt]`, rad and m, map frame, by each."""
 
     def extended(self, imu: Imu | None, globals: Globals, until: float) -> tuple[Samples, int]:
         """Extend by the IMU, or at constant velocity without one.

@@ -17,15 +17,15 @@ use crate::arrays::{
 };
 use crate::errors::in_pool;
 
-/// Poses of the IMU in the map at a uniform rate, and how they follow the calibration.
+/// Poses of the IMU in the map at a uniform rate, and how they follow the slow states; those behind
+/// the last response do not.
 #[pyclass(frozen, module = "bentwing._core")]
 pub(crate) struct Samples(pub(crate) Trajectory, pub(crate) Vec<PoseResponse>);
 
 impl Samples {
     /// Poses that nothing but a registration moves.
     fn unmoved(trajectory: Trajectory) -> Self {
-        let responses = vec![UNMOVED; trajectory.len()];
-        Self(trajectory, responses)
+        Self(trajectory, Vec::new())
     }
 }
 
@@ -101,7 +101,11 @@ impl Samples {
             self.0.positions()[first..=last].to_vec(),
             self.0.rotations()[first..=last].to_vec(),
         )
-        .map(|trajectory| Self(trajectory, self.1[first..=last].to_vec()))
+        .map(|trajectory| {
+            let n = self.1.len();
+            let responses = self.1[first.min(n)..(last + 1).min(n)].to_vec();
+            Self(trajectory, responses)
+        })
         .map_err(|e| PyValueError::new_err(e.to_string()))
     }
 
@@ -127,7 +131,11 @@ impl Samples {
         }
         let positions = [&self.0.positions()[..first], newer.0.positions()].concat();
         let rotations = [&self.0.rotations()[..first], newer.0.rotations()].concat();
-        let responses = [&self.1[..first], &newer.1].concat();
+        let mut responses = self.1[..first.min(self.1.len())].to_vec();
+        if !newer.1.is_empty() {
+            responses.resize(first, UNMOVED);
+            responses.extend_from_slice(&newer.1);
+        }
         Trajectory::new(self.0.start(), self.0.dt(), positions, rotations)
             .map(|trajectory| Self(trajectory, responses))
             .map_err(|e| PyValueError::new_err(e.to_string()))
@@ -160,9 +168,7 @@ impl Samples {
                 )
             }
         };
-        let mut responses = self.1.clone();
-        responses.resize(trajectory.len(), UNMOVED);
-        Ok((Self(trajectory, responses), n_blind))
+        Ok((Self(trajectory, self.1.clone()), n_blind))
     }
 
     /// These samples where a correction (20,) of the slow states moves them.
@@ -172,12 +178,17 @@ impl Samples {
         Self(trajectory, self.1.clone())
     }
 
-    /// How each sample follows the slow states (N, 6, 20): derivatives of its rotation, rad, and its
-    /// translation, m, in the map.
-    #[getter]
-    fn responses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
-        let flat = self.1.as_flattened().as_flattened();
-        flat.to_pyarray(py).reshape([self.1.len(), 6, N_GLOBALS])
+    /// How samples follow the slow states (K, 6, 20): derivatives of their rotations, rad, and their
+    /// translations, m, in the map.
+    fn responses_at<'py>(
+        &self,
+        py: Python<'py>,
+        samples: Vec<usize>,
+    ) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        let at = |i: &usize| self.1.get(*i).unwrap_or(&UNMOVED);
+        let chosen: Vec<PoseResponse> = samples.iter().map(at).copied().collect();
+        let flat = chosen.as_flattened().as_flattened();
+        flat.to_pyarray(py).reshape([chosen.len(), 6, N_GLOBALS])
     }
 
     /// Lidar points (N, 3) placed in the map.

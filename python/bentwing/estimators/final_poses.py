@@ -33,7 +33,7 @@ class FinalPoses:
         self._quats = samples.quats_xyzw[:n]
         self._slow = slow
         self._kept = np.minimum(np.arange(0, n + KEPT_RESPONSE, KEPT_RESPONSE), len(samples) - 1)
-        self._responses = samples.responses[self._kept].astype(np.float32)
+        self._responses = samples.responses_at(self._kept.tolist()).astype(np.float32)
 
     def by(self, slow: _core.Globals) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return positions (N, 3), m, and rotations (N, 4) by newer slow states."""

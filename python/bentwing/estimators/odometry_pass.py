@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 DT = 0.01  # s, interval of the trajectory's samples
 # The trajectory reaches this much beyond the newest stamp, for latencies of either sign, s.
 MARGIN = 0.05
+# So many samples are put away at a time.
+MANY = 1000
 # Without this much spread of the normals a direction is not seen by the matches alone.
 MIN_EIGENVALUE = 0.02
 
@@ -72,6 +74,7 @@ class OdometryPass:
         self._end = samples.end
         self.covariance = np.zeros((20, 20))
         self.timings = {"propagate": 0.0, "surfels": 0.0, "register": 0.0}
+        self._finish()  # a rest may have been long
 
     @property
     def end(self) -> float:
@@ -220,12 +223,21 @@ class OdometryPass:
         """Freeze what has left the window, and forget what no view can need any more."""
         next_start = self._window_start(self._end + self._settings.shift)
         self._views.update(self._surfels, next_start, self.samples, self.globals)
-        oldest = next_start - self._settings.view_length - self._settings.shift
+        oldest = self._oldest()
         self._surfels = [(t, s) for t, s in self._surfels if t >= oldest]
-        n = round((oldest - self.samples.start) / DT)
-        if n > 1000:
+        self._finish()
+
+    def _finish(self) -> None:
+        """Put away samples that no window or view can need any more."""
+        n = round((self._oldest() - self.samples.start) / DT)
+        if n > MANY:
             self._finished.append(FinalPoses(self.samples, n, self.globals))
             self.samples = self.samples.slice(n, len(self.samples) - 1)
+
+    def _oldest(self) -> float:
+        """Time from which on samples and surfels may still be needed, s."""
+        next_start = self._window_start(self._end + self._settings.shift)
+        return next_start - self._settings.view_length - self._settings.shift
 
     def _lap(self, name: str, since: float) -> float:
         now = time.perf_counter()

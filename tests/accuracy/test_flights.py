@@ -93,8 +93,9 @@ def test_healthy_windows_are_no_cause_for_alarm(flight):
 def test_a_minute_in_flight_with_a_spinning_scanner(flown, scene, seed):
     """Twice the length, twice the bound; a forest has no walls, so that its surfels are fewer."""
     score = flown(scene, 60.0, seed=seed).score
-    assert score.ate_flight < 0.3 * RANGE_SIGMA * (2 if scene == "forest" else 1)
-    assert score.map_ratio < 1.2
+    is_forest = scene == "forest"
+    assert score.ate_flight < 0.3 * RANGE_SIGMA * (2 if is_forest else 1)
+    assert score.map_ratio < (1.3 if is_forest else 1.2)
     assert abs(score.latency) < 0.4e-3
     assert score.horizontal < 1e-3
     assert score.vertical < 0.3e-3

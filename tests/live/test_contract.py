@@ -98,7 +98,7 @@ def feed_in_step(odometry, pieces, kind, other, reached):
 
 
 def read_until(done, odometry):
-    newest = 0.0
+    newest = window = 0.0
     while not done.is_set():
         if odometry.status == "waiting":
             time.sleep(1e-3)
@@ -108,7 +108,8 @@ def read_until(done, odometry):
         assert np.isfinite(pose.position).all()
         newest = pose.time
         odometry.new_points()
-        assert odometry.health["time"] > 0
+        assert window <= odometry.health["time"] <= odometry.pose().time
+        window = odometry.health["time"]
         assert odometry.counts["live.points_dropped"] == 0
 
 

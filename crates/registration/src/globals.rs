@@ -86,7 +86,10 @@ impl Globals {
         set(index::EXTRINSIC_TRANSLATION, shift(a, b));
         set(index::GYRO_BIAS, self.gyro_bias - earlier.gyro_bias);
         set(index::ACCEL_BIAS, self.accel_bias - earlier.accel_bias);
-        set(index::GRAVITY, tilt(&earlier.gravity, &self.gravity));
+        set(
+            index::GRAVITY,
+            turn_about_x_and_y(&earlier.gravity, &self.gravity),
+        );
         delta[index::LATENCY] = self.head.latency - earlier.head.latency;
         if let (Some(now), Some(then)) = (&self.head.motor, &earlier.head.motor) {
             delta[index::ENCODER_ZERO] = now.zero - then.zero;
@@ -105,7 +108,7 @@ impl Globals {
 ///
 /// The shortest rotation turns a little about z as well; what it misses is turned again. Gravity is
 /// within degrees of z, where that converges in a few steps.
-fn tilt(from: &Vector3<f64>, to: &Vector3<f64>) -> Vector3<f64> {
+fn turn_about_x_and_y(from: &Vector3<f64>, to: &Vector3<f64>) -> Vector3<f64> {
     let (from, to) = (from.normalize(), to.normalize());
     let mut found = Vector3::zeros();
     for _ in 0..20 {

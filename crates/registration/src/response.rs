@@ -76,10 +76,6 @@ pub fn at_samples(
 
 /// Makes the first control points functions of the global states: they are no unknowns any more.
 pub fn tie(equations: &mut NormalEquations, ties: &[PoseResponse]) {
-    let is_still = |tie: &PoseResponse| tie.as_flattened().iter().all(|v| *v == 0.0);
-    if ties.iter().all(is_still) {
-        return;
-    }
     // `J_k δ_k = J_k T_k g`: the rows of k go to the columns of g.
     let mut arrows = vec![[[0.0; 6]; N_GLOBALS]; equations.n_controls()];
     for ((row, column), block) in equations.blocks() {
@@ -155,10 +151,12 @@ pub fn follow(trajectory: &mut Trajectory, responses: &[PoseResponse], globals: 
 
 #[cfg(test)]
 mod tests {
+    use bentwing_trajectory::TrajectoryError;
+
     use super::*;
     use crate::rows::RowGroup;
-    use crate::solve::Solver;
     use crate::solve::testing::equations;
+    use crate::solve::{SolveError, Solver};
 
     const N: usize = 12;
     const NONE_FROZEN: [bool; N_GLOBALS] = [false; N_GLOBALS];
@@ -183,11 +181,11 @@ mod tests {
     }
 
     #[test]
-    fn tied_control_points_are_where_stiff_rows_would_hold_them() {
+    fn tied_control_points_are_where_stiff_rows_would_hold_them() -> Result<(), SolveError> {
         let mut tied = equations(N);
         tie(&mut tied, &ties());
-        let factorized = Solver::default().factorize(&tied, N_JOINED, &NONE_FROZEN);
-        let mut step = factorized.unwrap().solve();
+        let factorized = Solver::default().factorize(&tied, N_JOINED, &NONE_FROZEN)?;
+        let mut step = factorized.solve();
         complete(&mut step, &ties());
 
         let mut stiff = equations(N);
@@ -203,16 +201,18 @@ mod tests {
             }
             group.flush(&mut stiff);
         }
-        let factorized = Solver::default().factorize(&stiff, 0, &NONE_FROZEN);
-        let expected = factorized.unwrap().solve();
+        let factorized = Solver::default().factorize(&stiff, 0, &NONE_FROZEN)?;
+        let expected = factorized.solve();
         assert_near(&step.globals, &expected.globals, 1e-5);
         for (knot, expected) in step.knots.iter().zip(&expected.knots) {
             assert_near(knot, expected, 1e-5);
         }
+        Ok(())
     }
 
     #[test]
-    fn responses_tell_where_control_points_go_when_the_globals_are_held_elsewhere() {
+    fn responses_tell_where_control_points_go_when_the_globals_are_held_elsewhere()
+    -> Result<(), SolveError> {
         let solved = |held_at: Option<f64>| {
             let mut tied = equations(N);
             tie(&mut tied, &ties());
@@ -222,15 +222,13 @@ mod tests {
                     tied.global_gradient[g] -= 1e9 * value * (g as f64).cos();
                 }
             }
-            let factorized = Solver::default()
-                .factorize(&tied, N_JOINED, &NONE_FROZEN)
-                .unwrap();
+            let factorized = Solver::default().factorize(&tied, N_JOINED, &NONE_FROZEN)?;
             let mut step = factorized.solve();
             complete(&mut step, &ties());
-            (step, factorized.marginals(&ties()).responses)
+            Ok::<_, SolveError>((step, factorized.marginals(&ties()).responses))
         };
-        let (_, responses) = solved(None);
-        let (here, there) = (solved(Some(0.1)).0, solved(Some(0.3)).0);
+        let (_, responses) = solved(None)?;
+        let (here, there) = (solved(Some(0.1))?.0, solved(Some(0.3))?.0);
         let moved = std::array::from_fn(|g| 0.2 * (g as f64).cos());
         for (k, response) in responses.iter().enumerate() {
             let expected: Vec<f64> = (0..6)
@@ -238,16 +236,17 @@ mod tests {
                 .collect();
             assert_near(&followed(response, &moved), &expected, 1e-5);
         }
+        Ok(())
     }
 
     #[test]
-    fn a_joined_spline_goes_on_with_value_and_slope() {
+    fn a_joined_spline_goes_on_with_value_and_slope() -> Result<(), TrajectoryError> {
         let n = 101;
         let poses = (
             vec![Vector3::zeros(); n],
             vec![nalgebra::UnitQuaternion::identity(); n],
         );
-        let trajectory = Trajectory::new(2.0, 0.01, poses.0, poses.1).unwrap();
+        let trajectory = Trajectory::new(2.0, 0.01, poses.0, poses.1)?;
         let spline = CorrectionSpline::covering(trajectory.start(), trajectory.end(), 0.2);
         let parabola = |t: f64| {
             let mut response = response(0.4);
@@ -267,5 +266,6 @@ mod tests {
             pairs.map(|(b, a)| (b - a) / 0.01).collect()
         };
         assert_near(&slope(&going_on), &slope(&past), 0.02);
+        Ok(())
     }
 }

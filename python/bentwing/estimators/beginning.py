@@ -55,10 +55,8 @@ def begin_pass(
         prior.observe_rest(quat, start.static.accel_std)
     n = max(2, int((start.hold - first) / DT) + 1)
     turns = geometry.exp(DT * np.arange(n)[:, None] * start.rate)
-    positions, quats = (
-        np.zeros((n, 3)),
-        geometry.multiply(np.broadcast_to(quat, turns.shape), turns),
-    )
+    positions = np.zeros((n, 3))
+    quats = geometry.multiply(np.broadcast_to(quat, turns.shape), turns)
     if before is not None:
         at, quat = extrapolated(before.trajectory(), first)
         turn = heading(geometry.multiply(quat, geometry.inverse(quats[0])))

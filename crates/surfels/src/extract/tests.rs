@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-use bentwing_trajectory::so3;
+use bentwing_trajectory::{TrajectoryError, so3};
 use nalgebra::Isometry3;
 use proptest::prelude::*;
 
@@ -58,13 +58,13 @@ fn wall(trajectory: &Trajectory, head: &Head) -> (Vec<[f64; 3]>, Vec<f64>) {
 
 /// A corner of two walls is flat in the plane of a scan that does not move: that is no surface.
 #[test]
-fn the_plane_of_a_resting_scan_is_no_surfel() {
+fn the_plane_of_a_resting_scan_is_no_surfel() -> Result<(), TrajectoryError> {
     let trajectory = Trajectory::new(
         -0.05,
         0.01,
         vec![Vector3::zeros(); 121],
         vec![nalgebra::UnitQuaternion::identity(); 121],
-    );
+    )?;
     let head = Head {
         latency: 0.0,
         ..head()
@@ -84,9 +84,9 @@ fn the_plane_of_a_resting_scan_is_no_surfel() {
         min_incidence_cosine: 0.0,
         ..settings()
     };
-    let trajectory = trajectory.unwrap();
     assert!(!extract(points, &trajectory, &head, &anything).is_empty());
     assert!(extract(points, &trajectory, &head, &settings()).is_empty());
+    Ok(())
 }
 
 #[test]

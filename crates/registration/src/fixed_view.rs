@@ -68,6 +68,11 @@ impl FixedView {
     }
 
     /// Adds `sign · ∂(nᵀ μ)/∂(global states)` of surfel `j`, of its pose's part.
+    #[inline(always)]
+    #[allow(
+        clippy::inline_always,
+        reason = "only what is inlined into a dispatched function uses the machine's instructions"
+    )]
     pub(crate) fn add_pose_response(
         &self,
         globals: &mut [f64],

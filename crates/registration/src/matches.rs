@@ -1,8 +1,14 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Pairs of surfels that are taken for the same patch of a surface.
 
+#![allow(
+    clippy::inline_always,
+    reason = "only what is inlined into a dispatched function uses the machine's instructions"
+)]
+
 use bentwing_neighbors::{Grid, Search, claimed_pairs, mutual_pairs};
 use bentwing_trajectory::Head;
+use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 use crate::constraints::surfel_match::{self, MatchPlane};
@@ -55,10 +61,18 @@ pub fn grid_of(surfels: &[PlacedSurfel], voxel_size: f64) -> Grid {
 
 /// Mutual nearest neighbours on every level, within the window and with the fixed views.
 pub fn find(placed: &Placed, views: &[&FixedView], settings: &Settings) -> Vec<Match> {
-    let mut pairs = Vec::new();
-    for level in 0..placed.voxel_sizes.len() {
-        find_on_level(level, placed, views, settings, &mut pairs);
-    }
+    let levels: Vec<usize> = (0..placed.voxel_sizes.len()).collect();
+    let grid = |&l: &usize| grid_of(&placed.surfels[placed.level(l)], placed.voxel_sizes[l]);
+    let grids: Vec<Grid> = levels.par_iter().map(grid).collect();
+    let in_window = levels.iter().map(|&level| (level, None));
+    let in_views = (0u32..)
+        .zip(views)
+        .flat_map(|(v, &view)| levels.iter().map(move |&level| (level, Some((v, view)))));
+    let searches: Vec<_> = in_window.chain(in_views).collect();
+    let pairs: Vec<Vec<Pair>> = searches
+        .par_iter()
+        .map(|&(level, view)| find_on_level(level, view, placed, &grids[level], settings))
+        .collect();
     let plane = |&pair: &Pair| {
         let surfel = &placed.surfels[pair.0 as usize];
         let covariance = match pair.1 {
@@ -70,38 +84,42 @@ pub fn find(placed: &Placed, views: &[&FixedView], settings: &Settings) -> Vec<M
         Match { pair, plane, group }
     };
     let mut matches = Vec::new();
+    let pairs = pairs.concat();
     let planes = pairs.par_iter().with_min_len(MIN_ROWS_PER_TASK).map(plane);
     planes.collect_into_vec(&mut matches);
     matches
 }
 
+/// Pairs of the surfels of one level, which are in `grid`, among themselves or with a view.
 fn find_on_level(
     level: usize,
+    view: Option<(u32, &FixedView)>,
     placed: &Placed,
-    views: &[&FixedView],
+    grid: &Grid,
     settings: &Settings,
-    pairs: &mut Vec<Pair>,
-) {
+) -> Vec<Pair> {
     let search = Search {
         k: settings.n_neighbors,
         max_distance: settings.max_match_distance as f32,
         min_time_gap: settings.min_match_gap as f32,
     };
     let first = placed.level_starts[level] as u32;
-    let surfels = &placed.surfels[placed.level(level)];
-    let grid = grid_of(surfels, placed.voxel_sizes[level]);
-    let nearest = grid.nearest(&grid, &search);
-    let moving = mutual_pairs(&nearest);
-    pairs.extend(moving.map(|(a, b)| (first + a, Target::Moving(first + b))));
-    for (v, view) in (0u32..).zip(views) {
-        let Some(fixed) = view.grids.get(level) else {
-            continue;
-        };
-        let nearest = fixed.nearest(&grid, &search);
-        let first_fixed = view.level_starts[level] as u32;
-        let claimed = claimed_pairs(&nearest, fixed.len()).into_iter();
-        pairs.extend(claimed.map(|(a, b)| (first + a, Target::Fixed(v, first_fixed + b))));
-    }
+    let Some((v, view)) = view else {
+        let nearest = grid.nearest(grid, &search);
+        let moving = mutual_pairs(&nearest);
+        return moving
+            .map(|(a, b)| (first + a, Target::Moving(first + b)))
+            .collect();
+    };
+    let Some(fixed) = view.grids.get(level) else {
+        return Vec::new();
+    };
+    let nearest = fixed.nearest(grid, &search);
+    let first_fixed = view.level_starts[level] as u32;
+    let claimed = claimed_pairs(&nearest, fixed.len()).into_iter();
+    claimed
+        .map(|(a, b)| (first + a, Target::Fixed(v, first_fixed + b)))
+        .collect()
 }
 
 /// Rows below which a task is not worth starting.
@@ -110,6 +128,25 @@ const MIN_ROWS_PER_TASK: usize = 512;
 /// Sums of rows that are held at once; fixed, so that the order of addition does not depend on the
 /// number of threads.
 const MAX_TASKS: usize = 16;
+
+/// Rows that are summed in one go.
+struct RowSum<'a> {
+    all: &'a MatchRows<'a>,
+    rows: &'a [Match],
+    n_controls: usize,
+    step: Option<&'a Solution>,
+    scale: f64,
+}
+
+impl WithSimd for RowSum<'_> {
+    type Output = (NormalEquations, Health);
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Self::Output {
+        self.all
+            .sum(self.rows, self.n_controls, self.step, self.scale)
+    }
+}
 
 /// The matches of an outer iteration, ordered by the control points they touch.
 pub struct MatchRows<'a> {
@@ -133,7 +170,8 @@ impl<'a> MatchRows<'a> {
         for m in &mut *matches {
             m.group = group(placed, m.pair);
         }
-        matches.sort_unstable_by_key(|m| (m.group, m.pair));
+        // Views in the order of their surfels, whose poses' responses are large.
+        matches.par_sort_unstable_by_key(|m| (m.group, m.pair.1, m.pair.0));
         Self {
             placed,
             views,
@@ -156,8 +194,18 @@ impl<'a> MatchRows<'a> {
         let n_rows = self.matches.len().div_ceil(MAX_TASKS);
         let tasks = self.matches.par_chunks(n_rows.max(MIN_ROWS_PER_TASK));
         let n_controls = equations.n_controls();
+        let arch = Arch::new();
         let sums: Vec<_> = tasks
-            .map(|rows| self.sum(rows, n_controls, step, scale))
+            // The widest instructions of the machine; the order of operations is the same.
+            .map(|rows| {
+                arch.dispatch(RowSum {
+                    all: self,
+                    rows,
+                    n_controls,
+                    step,
+                    scale,
+                })
+            })
             .collect();
         let mut health = Health::default();
         for (part, part_health) in &sums {
@@ -167,6 +215,7 @@ impl<'a> MatchRows<'a> {
         health
     }
 
+    #[inline(always)]
     fn sum(
         &self,
         rows: &[Match],
@@ -187,6 +236,7 @@ impl<'a> MatchRows<'a> {
         (equations, health)
     }
 
+    #[inline(always)]
     fn add_row(
         &self,
         row: &Match,

@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Rows that touch the same control points are summed in one small dense block.
 
+#![allow(
+    clippy::inline_always,
+    reason = "only what is inlined into a dispatched function uses the machine's instructions"
+)]
+
 use faer::linalg::matmul::triangular::{BlockStructure, matmul};
 use faer::{Accum, Mat, MatRef, Par};
 
@@ -86,6 +91,7 @@ impl RowGroup {
     }
 
     /// Adds the current row with residual `r` and weight `w`.
+    #[inline(always)]
     pub fn add(&mut self, r: f64, w: f64) {
         let (root, residual) = (w.sqrt(), self.width - 1);
         let row = self.row_mut();
@@ -101,6 +107,7 @@ impl RowGroup {
         }
     }
 
+    #[inline(never)]
     fn multiply(&mut self) {
         let gathered = &self.gathered[..self.current];
         let n = self.current / self.width;

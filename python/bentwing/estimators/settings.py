@@ -54,7 +54,7 @@ class ContinuousSettings(_Section):
     """The sliding window of the continuous estimator."""
 
     window: float = Field(5.0, gt=0, description="length, s")
-    shift: float = Field(1.0, gt=0, description="new data per step, s")
+    shift: float = Field(1.5, gt=0, description="new data per step, s")
     window_without_imu: float = Field(2.0, gt=0, description="length without an IMU, s")
     shift_without_imu: float = Field(
         0.2,

@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Two observations of a patch lie in one plane: `e = nᵀ (μ_i − μ_j)` (Kaul 2015, eq. 5–6).
 
+#![allow(
+    clippy::inline_always,
+    reason = "only what is inlined into a dispatched function uses the machine's instructions"
+)]
+
 use bentwing_surfels::sym3;
 use bentwing_trajectory::{Head, so3};
 use nalgebra::{Matrix3, Vector3};
@@ -29,6 +34,7 @@ impl MatchPlane {
     }
 
     /// The unit normal, map frame.
+    #[inline(always)]
     pub fn normal(&self, surfel: &PlacedSurfel) -> Vector3<f64> {
         surfel.R_map_imu * self.normal_imu
     }
@@ -37,6 +43,7 @@ impl MatchPlane {
 /// Writes `sign · ∂(nᵀ μ)/∂(control points)` for the four control points of `surfel`.
 ///
 /// `∂μ/∂[δr, δt] = B_m [−l×, I]`, with l the lever from the IMU, so the row is `B_m [l × n, n]`.
+#[inline(always)]
 pub fn write_knots(knots: &mut [f64], surfel: &PlacedSurfel, n: &Vector3<f64>, sign: f64) {
     let turn = surfel.lever.cross(n);
     for (entries, w) in knots.chunks_exact_mut(6).zip(surfel.basis.weights) {
@@ -49,6 +56,7 @@ pub fn write_knots(knots: &mut [f64], surfel: &PlacedSurfel, n: &Vector3<f64>, s
 }
 
 /// Adds `sign · ∂(nᵀ μ)/∂(global states)`.
+#[inline(always)]
 pub fn add_globals(
     globals: &mut [f64],
     head: &Head,

@@ -8,6 +8,7 @@ radians, quaternions x y z w; `threads` 0 means one per core, and no result depe
 """
 
 from collections.abc import Sequence
+from os import PathLike
 from typing import TypeAlias, final
 
 import numpy as np
@@ -20,6 +21,7 @@ __all__ = [
     "FixedView",
     "Globals",
     "Imu",
+    "LazCompressor",
     "Registration",
     "Samples",
     "Scene",
@@ -34,6 +36,29 @@ __version__: str
 _Vector: TypeAlias = Sequence[float] | NDArray[np.float64]
 _Transform: TypeAlias = tuple[_Vector, _Vector]
 """Translation (3,) m and unit quaternion (4,)."""
+
+@final
+class LazCompressor:
+    """Appends compressed points to a LAZ file whose header is written already.
+
+    Parameters
+    ----------
+    point_format : 0 to 10, of the LAS specification
+    n_extra_bytes : size of the extra dimensions of a point
+    """
+
+    def __new__(cls, point_format: int, n_extra_bytes: int) -> LazCompressor: ...
+    def record_data(self) -> bytes:
+        """Return the record that the header of the file must announce."""
+
+    def begin(self, path: str | PathLike[str], offset: int) -> None:
+        """Begin behind the first `offset` bytes of the file."""
+
+    def compress(self, points: NDArray[np.uint8], *, threads: int = 0) -> None:
+        """Append points, record after record as LAS has them (N · size of a point,)."""
+
+    def finish(self, *, threads: int = 0) -> None:
+        """Write what is held back and the table of chunks."""
 
 @final
 class Scene:

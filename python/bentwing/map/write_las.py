@@ -9,6 +9,7 @@ import laspy
 import numpy as np
 
 from bentwing.errors import EstimationError
+from bentwing.map.compress_laz import LazBackend
 from bentwing.map.gps_time import adjusted_gps_origin
 from bentwing.map.writer import MapWriter
 
@@ -41,12 +42,11 @@ class LasWriter(MapWriter):
     def _begin(self, first: MapChunk) -> None:
         self._header = _header(first)
         self._intensity_scale = _intensity_scale(first)
-        backend = laspy.LazBackend.LazrsParallel if self.compressed else None
         self._writer = laspy.LasWriter(
             self._temporary.open("wb"),
             self._header,
             do_compress=self.compressed,
-            laz_backend=backend,
+            laz_backend=LazBackend(self._temporary) if self.compressed else None,
         )
 
     def _append(self, chunk: MapChunk) -> None:

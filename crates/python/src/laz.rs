@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! `_core.LazCompressor`: LAZ points without the GIL, which the wheels of `lazrs` hold all the while.
+
+use std::fs::{File, OpenOptions};
+use std::io::{Seek, SeekFrom};
+use std::path::PathBuf;
+
+use ::laz::{LasZipError, LazItemRecordBuilder, LazVlr, LazVlrBuilder, ParLasZipCompressor};
+use numpy::PyReadonlyArray1;
+use pyo3::exceptions::{PyOSError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+
+use crate::errors::in_pool;
+
+/// Appends compressed points to a file whose header is written already.
+#[pyclass(module = "bentwing._core")]
+pub(crate) struct LazCompressor {
+    vlr: LazVlr,
+    point_size: usize,
+    file: Option<ParLasZipCompressor<File>>,
+}
+
+#[pymethods]
+impl LazCompressor {
+    #[new]
+    fn new(point_format: u8, n_extra_bytes: u16) -> PyResult<Self> {
+        let items = LazItemRecordBuilder::default_for_point_format_id(point_format, n_extra_bytes);
+        let items = items.map_err(|e| PyValueError::new_err(format!("point_format: {e}")))?;
+        let vlr = LazVlrBuilder::new(items).build();
+        let point_size = vlr.items_size() as usize;
+        Ok(Self {
+            vlr,
+            point_size,
+            file: None,
+        })
+    }
+
+    /// The record that the header of the file must announce.
+    fn record_data<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        let mut data = Vec::new();
+        self.vlr.write_to(&mut data)?;
+        Ok(PyBytes::new(py, &data))
+    }
+
+    /// Begins behind the first `offset` bytes of the file.
+    fn begin(&mut self, path: PathBuf, offset: u64) -> PyResult<()> {
+        let mut file = OpenOptions::new().write(true).open(path)?;
+        file.seek(SeekFrom::Start(offset))?;
+        let compressor = ParLasZipCompressor::new(file, self.vlr.clone()).map_err(os_error)?;
+        self.file = Some(compressor);
+        Ok(())
+    }
+
+    /// Appends points, record after record as LAS has them.
+    #[pyo3(signature = (points, *, threads=0))]
+    fn compress(
+        &mut self,
+        py: Python<'_>,
+        points: PyReadonlyArray1<'_, u8>,
+        threads: usize,
+    ) -> PyResult<()> {
+        let bytes = points.as_slice()?;
+        if !bytes.len().is_multiple_of(self.point_size) {
+            let message = format!(
+                "points: expected a multiple of {} bytes, got {}",
+                self.point_size,
+                bytes.len()
+            );
+            return Err(PyValueError::new_err(message));
+        }
+        let file = begun(&mut self.file)?;
+        Ok(in_pool(py, threads, || file.compress_many(bytes))??)
+    }
+
+    /// Writes what is held back and the table of chunks.
+    #[pyo3(signature = (*, threads=0))]
+    fn finish(&mut self, py: Python<'_>, threads: usize) -> PyResult<()> {
+        let file = begun(&mut self.file)?;
+        in_pool(py, threads, || file.done())?.map_err(os_error)?;
+        self.file = None;
+        Ok(())
+    }
+}
+
+fn begun(file: &mut Option<ParLasZipCompressor<File>>) -> PyResult<&mut ParLasZipCompressor<File>> {
+    let missing = || PyValueError::new_err("begin() was not called, or finish() was");
+    file.as_mut().ok_or_else(missing)
+}
+
+fn os_error(error: LasZipError) -> PyErr {
+    match error {
+        LasZipError::IoError(e) => e.into(),
+        other => PyOSError::new_err(other.to_string()),
+    }
+}

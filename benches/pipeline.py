@@ -43,7 +43,7 @@ def measure(scene: str, head: str, seed: int, options: argparse.Namespace) -> di
     with tempfile.TemporaryDirectory() as folder:
         simulated, out = Path(folder) / "recording", Path(folder) / "run"
         choices = ["--head", head, "--seed", str(seed), "--duration", f"{options.duration:g}"]
-        run("simulate", scene, "-o", simulated, *choices)
+        run("simulate", scene, "-o", simulated, *choices, *varied(options))
         recording, payload = simulated / "recording.bag", simulated / "payload.yaml"
         command = [recording, "--payload", payload, "-o", out, "--quiet"]
         threads = [] if options.threads is None else ["--threads", str(options.threads)]
@@ -54,6 +54,7 @@ def measure(scene: str, head: str, seed: int, options: argparse.Namespace) -> di
             "head": head,
             "seed": seed,
             "duration": options.duration,
+            "varied": varied(options),
             "threads": options.threads,
             "version": record["versions"],
             "cost": asdict(cost),
@@ -61,6 +62,13 @@ def measure(scene: str, head: str, seed: int, options: argparse.Namespace) -> di
             "warnings": record["warnings"],
             "score": score(simulated, out).as_dict(),
         }
+
+
+def varied(options: argparse.Namespace) -> list[str]:
+    """What makes a recording unlike the scenario's own, as options of `bentwing simulate`."""
+    given = [("--event", event) for event in options.event]
+    given += [("--motor-rate", options.motor_rate), ("--max-range", options.max_range)]
+    return [str(word) for pair in given if pair[1] is not None for word in pair]
 
 
 def row(result: dict) -> str:
@@ -82,7 +90,8 @@ def row(result: dict) -> str:
         f"{found['map_ratio']:.2f}",
         given(found["latency"], 1e3, "ms"),
         extrinsics,
-        f"{result['duration'] / cost['seconds']:.2f} x real time",
+        f"{result['duration'] / cost['seconds']:.2f} x real time "
+        f"(estimate {result['duration'] / timings['estimate']:.2f} x)",
         f"{cost['cpu'] / result['duration']:.2f} s",
         shares,
         f"{cost['megabytes']:.0f} MB",
@@ -95,11 +104,22 @@ def given(value: float | None, factor: float, unit: str) -> str:
     return "-" if value is None else f"{value * factor:.2f} {unit}"
 
 
+def honesty(results: list[dict]) -> str:
+    """How large the errors of the slow states are in units of their standard deviations."""
+    lines = ["| state | recordings | mean squared error over variance, by axis |", "|---|---|---|"]
+    states = [result["score"]["normalized"] for result in results]
+    for name in sorted(set().union(*states)):
+        errors = np.array([state[name] for state in states if name in state])
+        squares = ", ".join(f"{mean:.2f}" for mean in np.mean(errors**2, axis=0))
+        lines.append(f"| {name} | {len(errors)} | {squares} |")
+    return "\n".join(lines)
+
+
 def medians(results: list[dict]) -> dict:
     """The middle of several seeds of one scene and head."""
     middle = {**results[0], "seed": f"median of {len(results)}"}
     for part in ("score", "cost", "timings"):
-        keys = results[0][part]
+        keys = [key for key, value in results[0][part].items() if not isinstance(value, dict)]
         values = {key: [r[part].get(key) for r in results] for key in keys}
         middle[part] = {
             key: None if None in found else statistics.median(found)
@@ -124,6 +144,9 @@ def main() -> None:
     parser.add_argument("--heads", nargs="+", default=["hokuyo-spin"])
     parser.add_argument("--seeds", nargs="+", type=int, default=[0])
     parser.add_argument("--duration", type=float, default=60.0, help="of each flight, in s")
+    parser.add_argument("--event", action="append", default=[], help="as of bentwing simulate")
+    parser.add_argument("--motor-rate", type=float, help="of vlp16-motor, rad/s")
+    parser.add_argument("--max-range", type=float, help="the lidar sees up to here, m")
     parser.add_argument("--threads", type=int, help="of the estimator; default: all cores")
     parser.add_argument("--json", type=Path, default=RESULTS, help="default: %(default)s")
     options = parser.parse_args()
@@ -138,6 +161,7 @@ def main() -> None:
         if len(of_head) > 1:
             print(row(medians(of_head)), flush=True)
         results += of_head
+    print(f"\n{honesty(results)}")
     keep(results, options.json)
 
 

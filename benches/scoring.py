@@ -6,7 +6,7 @@ from __future__ import annotations
 import json
 from collections import Counter
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import laspy
 import numpy as np
@@ -44,6 +44,7 @@ class Score:
     latency : s
     extrinsic_rotation, extrinsic_translation : rad, m
     gyro_bias, accel_bias : rad/s, m/s², against the truth at the end
+    normalized : errors of the slow states over their stated standard deviations, by axis
     """
 
     ate: float
@@ -61,8 +62,9 @@ class Score:
     extrinsic_translation: float | None
     gyro_bias: float
     accel_bias: float
+    normalized: dict[str, list[float]]
 
-    def as_dict(self) -> dict[str, float | None]:
+    def as_dict(self) -> dict[str, Any]:
         return asdict(self)
 
 
@@ -81,7 +83,8 @@ def score(simulated: Path, run: Path) -> Score:
     placed = scene.distance(np.ascontiguousarray(points @ R.T + flown.alignment.t))[0]
     best = scene.distance(best_points(simulated, truth, origin_ns, flight))[0]
     error = surface_error(placed, best=best)
-    found, biases = record["calibration"], true["imu_biases"]["end"]
+    found = record["calibration"]
+    errors = calibration_errors(found, true)
     return Score(
         ate=whole.position.rmse,
         ate_flight=flown.position.rmse,
@@ -93,10 +96,16 @@ def score(simulated: Path, run: Path) -> Score:
         map_std=error.std,
         map_ratio=error.best_ratio or np.nan,
         map_excluded=error.n_excluded / error.n_points,
-        latency=found["latency"] - true["latency"],
-        **_extrinsic_errors(found, true),
-        gyro_bias=float(np.linalg.norm(np.subtract(found["gyro_bias"], biases["gyro"]))),
-        accel_bias=float(np.linalg.norm(np.subtract(found["accel_bias"], biases["accel"]))),
+        latency=float(errors["latency"][0]),
+        extrinsic_rotation=_norm(errors.get("extrinsic_rotation")),
+        extrinsic_translation=_norm(errors.get("extrinsic_translation")),
+        gyro_bias=float(np.linalg.norm(errors["gyro_bias"])),
+        accel_bias=float(np.linalg.norm(errors["accel_bias"])),
+        normalized={
+            name: np.divide(error, found["std"][name]).tolist()
+            for name, error in errors.items()
+            if name in found["std"]
+        },
     )
 
 
@@ -166,16 +175,24 @@ def moved_by(T: dict[str, list[float]], points: np.ndarray) -> np.ndarray:
     return geometry.compose(np.array(T["translation"]), np.array(T["quaternion"]), points)
 
 
-def _extrinsic_errors(found: dict, true: dict) -> dict[str, float | None]:
-    if "T_imu_lidar" not in true:
-        return {"extrinsic_rotation": None, "extrinsic_translation": None}
-    mount = true["T_imu_lidar"]
-    turn = geometry.multiply(
-        np.array(found["mount"]["T_imu_lidar"]["quat_xyzw"]),
-        geometry.inverse(np.array(mount["quaternion"])),
-    )
-    shift = np.subtract(found["mount"]["T_imu_lidar"]["translation"], mount["translation"])
-    return {
-        "extrinsic_rotation": float(np.linalg.norm(geometry.log(turn))),
-        "extrinsic_translation": float(np.linalg.norm(shift)),
+def calibration_errors(found: dict, true: dict) -> dict[str, np.ndarray]:
+    """Found minus true, by the names and in the units of the standard deviations in run.json."""
+    biases = true["imu_biases"]["end"]
+    errors = {
+        "latency": np.array([found["latency"] - true["latency"]]),
+        "gyro_bias": np.subtract(found["gyro_bias"], biases["gyro"]),
+        "accel_bias": np.subtract(found["accel_bias"], biases["accel"]),
     }
+    if "T_imu_lidar" in true:
+        mount, described = found["mount"]["T_imu_lidar"], true["T_imu_lidar"]
+        back = geometry.inverse(np.array(described["quaternion"]))
+        turn = geometry.multiply(np.array(mount["quat_xyzw"]), back)
+        errors["extrinsic_rotation"] = geometry.log(turn)
+        errors["extrinsic_translation"] = np.subtract(
+            mount["translation"], described["translation"]
+        )
+    return errors
+
+
+def _norm(error: np.ndarray | None) -> float | None:
+    return None if error is None else float(np.linalg.norm(error))

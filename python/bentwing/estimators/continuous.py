@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 
 # A rest shorter than this is waited out before the start is judged, s.
 LOOK_AHEAD = 6.0
+# Behind a break the motion is a guess that must not grow until the lidar corrects it: so many windows
+# instead of one.
+STEPS_BEHIND_BREAK = 3
 
 
 class Continuous:
@@ -183,7 +186,7 @@ class Continuous:
             return False
         if broken is not None:
             ready, finishing = broken.start, True
-        end = current.end + self._sliding.shift
+        end = current.end + self._new_data
         if end > ready:
             if not finishing:
                 return False
@@ -193,6 +196,11 @@ class Continuous:
         current.step(self._buffer, end)
         self._settle(end)
         return True
+
+    @property
+    def _new_data(self) -> float:
+        """How much of it the next window takes, s: little as long as a break is not bridged."""
+        return self._sliding.shift / (1 if self._bridged is None else STEPS_BEHIND_BREAK)
 
     def _settle(self, end: float) -> None:
         """Judge a bridge when enough was seen behind it, and forget what no window needs."""

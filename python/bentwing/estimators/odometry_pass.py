@@ -103,9 +103,9 @@ class OdometryPass:
         watch = self._lap("propagate", watch)
         stretch = buffer.lidar(self._end, end)
         self._surfels.append((self._end, self._extract(stretch)))
-        self._end = end
+        new, self._end = end - self._end, end
         watch = self._lap("surfels", watch)
-        self._register(imu)
+        self._register(imu, new)
         self._lap("register", watch)
         self._retire()
 
@@ -164,7 +164,7 @@ class OdometryPass:
     def _window_start(self, end: float) -> float:
         return max(self._anchor, end - self._settings.window)
 
-    def _register(self, imu: _core.Imu | None) -> None:
+    def _register(self, imu: _core.Imu | None, new: float) -> None:
         start = self._window_start(self._end)
         first = max(0, round((start - self.samples.start) / DT))
         window = self.samples.slice(first, len(self.samples) - 1)
@@ -187,8 +187,7 @@ class OdometryPass:
         self.globals = result.globals
         self.covariance = self.prior.discounted(result.covariance)
         length = self._end - start
-        shift = min(self._settings.shift, length)
-        self.prior.carry(result.covariance, result.offset, shift, length)
+        self.prior.carry(result.covariance, result.offset, min(new, length), length)
         self.windows.append(self._record(result))
 
     def _record(self, result: _core.Registration) -> dict[str, Any]:

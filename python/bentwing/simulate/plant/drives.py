@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from bentwing.control.spin_controller import SpinSettings
-from bentwing.simulate.plant.flights import DESIRED, Drive
+from bentwing.simulate.plant.flights import Drive
 from bentwing.simulate.plant.parameters import SINGLE_FLAP, PlantSettings
 
 FREE_RATE = 2 * np.pi * 2.5
@@ -25,14 +25,14 @@ def held(rate: float) -> Drive:
     return Drive(None, SpinSettings().map_gain * rate)
 
 
-DRIVES = {
-    "135° arms, controller": Drive(),
-    "135° arms, no stall prevention": Drive(WITHOUT_STALL_PREVENTION),
-    "135° arms, no control": held(DESIRED),
-    "135° arms, single flaps, controller": Drive(plant=FLAPS),
-    "180° arms, controller": Drive(plant=STRAIGHT),
-    "180° arms, no stall prevention": Drive(WITHOUT_STALL_PREVENTION, plant=STRAIGHT),
-    "180° arms, no control": Drive(None, held(DESIRED).fixed_angle, STRAIGHT),
-    "135° arms, free at 2.5 Hz": held(FREE_RATE),
-}
-"""By what the tables call them."""
+def drives(desired: float) -> dict[str, Drive]:
+    """Return the drives that are compared at a desired rate (rad/s), by what the tables call them."""
+    return {
+        "135° arms, controller": Drive(),
+        "135° arms, no stall prevention": Drive(WITHOUT_STALL_PREVENTION),
+        "135° arms, no control": held(desired),
+        "135° arms, single flaps, controller": Drive(plant=FLAPS),
+        "180° arms, controller": Drive(plant=STRAIGHT),
+        "180° arms, no control": replace(held(desired), plant=STRAIGHT),
+        "135° arms, free at 2.5 Hz": held(FREE_RATE),
+    }

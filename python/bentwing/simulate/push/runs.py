@@ -24,8 +24,11 @@ if TYPE_CHECKING:
 PlaceName = Literal["office", "cave", "forest", "door"]
 PilotName = Literal["push", "drift"]
 
-SCAN_PERIOD = 0.01
-"""s, of the Hokuyo; the carrier is simulated and the bumper commands as often."""
+PERIOD = 0.02
+"""s; the bumper takes two sweeps of the Hokuyo and commands at 50 Hz."""
+SUBSTEPS = 2
+TIMED_EVERY = 5
+"""Commands; reading the thread's clock takes time itself."""
 WARM_UP = 1.0
 """s of hovering in which the grid fills, as before any flight."""
 MAX_STICK = np.radians(15.0)
@@ -51,7 +54,7 @@ class PushRun:
     place: PlaceName
     pilot: PilotName = "push"
     seed: int = 0
-    duration: float = 12.0
+    duration: float = 8.0
     max_wind: float = 3.0
     with_bumper: bool = True
     bumper: BumperSettings = field(default_factory=BumperSettings)
@@ -92,8 +95,8 @@ def run_push(run: PushRun) -> Pushed:
         run.carrier, free_start(world, rng, 1.0), np.zeros(3), rng.uniform(0, 2 * np.pi)
     )
     flight = _Flight(run, world, carrier, rng)
-    for k in range(round((WARM_UP + run.duration) / SCAN_PERIOD)):
-        if flight.step(k * SCAN_PERIOD):
+    for k in range(round((WARM_UP + run.duration) / PERIOD)):
+        if flight.step(k * PERIOD):
             break
     return flight.result()
 
@@ -108,8 +111,8 @@ class _Flight:
         heading = rng.uniform(0.0, 2 * np.pi) * (run.place != "door")
         self._course = np.array([np.cos(heading), np.sin(heading)])
         self._speed = rng.uniform(0.5, MAX_SPEED)
-        n = round((WARM_UP + run.duration) / SCAN_PERIOD)
-        gusts = [ornstein_uhlenbeck(rng, n, SCAN_PERIOD, 2.0, 0.25) for _ in range(2)]
+        n = round((WARM_UP + run.duration) / PERIOD)
+        gusts = [ornstein_uhlenbeck(rng, n, PERIOD, 2.0, 0.25) for _ in range(2)]
         blows = rng.uniform(0.0, 2 * np.pi)
         steady = rng.uniform(0.2, 0.6) * np.array([np.cos(blows), np.sin(blows)])
         wind = run.max_wind * (steady + np.column_stack(gusts))
@@ -122,16 +125,18 @@ class _Flight:
         self._latencies: list[float] = []
 
     def step(self, now: float) -> bool:
-        """Fly one scan's time; return whether something was touched."""
+        """Fly one period; return whether something was touched."""
         carrier = self._carrier
         hovering = now < WARM_UP
         stick = np.zeros(2) if hovering else self._stick()
         if self._run.with_bumper:
             stick = self._bumped(now, stick, hovering=hovering)
-        self._spin += self._spin_rate * SCAN_PERIOD
+        self._spin += self._spin_rate * PERIOD
         if hovering:
             return False
-        carrier.step(stick[0], stick[1], self._wind[round(now / SCAN_PERIOD)], SCAN_PERIOD)
+        wind = self._wind[round(now / PERIOD)]
+        for _ in range(SUBSTEPS):
+            carrier.step(stick[0], stick[1], wind, PERIOD / SUBSTEPS)
         gap = hull_clearance(self._world, self._run.carrier, carrier.position)
         self._gap = min(self._gap, gap)
         self._top = max(self._top, float(np.linalg.norm(carrier.velocity)))
@@ -155,12 +160,14 @@ class _Flight:
         return np.clip(_PILOT_GAIN * np.array([-left, forward]), -MAX_STICK, MAX_STICK)
 
     def _bumped(self, now: float, stick: Array, *, hovering: bool) -> Array:
-        points = scan(self._world, self._carrier, self._spin, self._rng)
+        sweeps = self._spin + self._spin_rate * PERIOD * np.array([-0.5, 0.0])
+        points = scan(self._world, self._carrier, sweeps, self._rng)
         state = believed(now, self._carrier, self._rng)
-        begun = time.thread_time()
+        timed = not hovering and round(now / PERIOD) % TIMED_EVERY == 0
+        begun = time.thread_time() if timed else 0.0
         self._bumper.add_points(now, self._carrier.position, points)
         command = self._bumper.command(now, state, pilot_roll=stick[0], pilot_pitch=stick[1])
-        if not hovering:
+        if timed:
             self._latencies.append(time.thread_time() - begun)
         self._push = max(self._push, float(np.linalg.norm(command.push)))
         return np.array([command.roll, command.pitch])

@@ -25,18 +25,21 @@ _MAX_RANGE = 30.0
 _BEAMS = ANGLE_MIN + ANGLE_INCREMENT * np.arange(N_BEAMS)
 
 
-def scan(world: World, carrier: Quadrotor, spin: float, rng: np.random.Generator) -> Array:
-    """Return the points (N, 3), m, map frame, of one sweep of the head turned by `spin` (rad).
+def scan(world: World, carrier: Quadrotor, spins: Array, rng: np.random.Generator) -> Array:
+    """Return the points (N, 3), m, map frame, of sweeps of the head turned by `spins` (S,), rad.
 
     The scan plane contains the vertical and its centre beam looks down (Kaul 2015, Fig. 4b); the
     IMU takes the carrier's tilt out of the plane's pose, so that it is left out here.
     """
-    across, up = np.sin(_BEAMS), -np.cos(_BEAMS)
-    azimuth = spin + carrier.yaw
-    directions = np.column_stack([across * np.cos(azimuth), across * np.sin(azimuth), up])
-    origins = np.broadcast_to(carrier.position, directions.shape)
-    ranges, _ = world.scene.cast(np.ascontiguousarray(origins), directions, _MAX_RANGE)
-    seen = np.isfinite(ranges) & (ranges > OWN) & (rng.random(N_BEAMS) > DROPOUT)
+    azimuths = spins[:, None] + carrier.yaw
+    up = np.broadcast_to(-np.cos(_BEAMS), (len(spins), N_BEAMS))
+    across = np.sin(_BEAMS)
+    fans = np.stack([across * np.cos(azimuths), across * np.sin(azimuths), up], axis=-1)
+    directions = np.ascontiguousarray(fans.reshape(-1, 3))
+    origins = np.ascontiguousarray(np.broadcast_to(carrier.position, directions.shape))
+    ranges, _ = world.scene.cast(origins, directions, _MAX_RANGE)
+    lost = rng.random(len(ranges)) < DROPOUT
+    seen = np.isfinite(ranges) & (ranges > OWN) & ~lost
     noisy = ranges[seen] + rng.normal(0.0, RANGE_NOISE, int(seen.sum()))
     return np.asarray(carrier.position + noisy[:, None] * directions[seen])
 

@@ -157,11 +157,12 @@ class VirtualBumper:
             if not math.isfinite(value)
         ]
         most = self.settings.max_tilt
-        stick = [0.0 if not math.isfinite(v) else v for v in (pilot_roll, pilot_pitch)]
-        stick = [min(max(v, -most), most) for v in stick]
+        roll, pitch = (_usable(stick, most) for stick in (pilot_roll, pilot_pitch))
         found = self._state_fault(time, state)
         if found is not None:
-            return BumperCommand(*stick, np.zeros(2), NO_SPRINGS, (*faults, f"{found}: no push"))
+            return BumperCommand(
+                roll, pitch, np.zeros(2), NO_SPRINGS, (*faults, f"{found}: no push")
+            )
         boundary = self.grid.occupied(time)
         springs = springs_to(
             self.settings.springs, boundary, state.position[:2], self.settings.hull_radius
@@ -170,7 +171,7 @@ class VirtualBumper:
             push(self.settings.springs, springs, state.velocity[:2]),
             GRAVITY * math.tan(self.settings.max_push),
         )
-        roll, pitch = self._blend(stick, pushed, state.yaw)
+        roll, pitch = self._blend(roll, pitch, pushed, state.yaw)
         return BumperCommand(roll, pitch, pushed, springs, tuple(faults))
 
     def _state_fault(self, time: float, state: CarrierState) -> str | None:
@@ -194,9 +195,9 @@ class VirtualBumper:
             return "no points yet"
         return age_fault("the newest point", time - self._newest, s.max_age)
 
-    def _blend(self, stick: list[float], pushed: Array, yaw: float) -> tuple[float, float]:
+    def _blend(self, roll: float, pitch: float, pushed: Array, yaw: float) -> tuple[float, float]:
         cos, sin = math.cos(yaw), math.sin(yaw)
-        forward, left = GRAVITY * math.tan(stick[1]), -GRAVITY * math.tan(stick[0])
+        forward, left = GRAVITY * math.tan(pitch), -GRAVITY * math.tan(roll)
         pilot = np.array([cos * forward - sin * left, sin * forward + cos * left])
         size = float(np.linalg.norm(pushed))
         if size > 0:
@@ -206,6 +207,11 @@ class VirtualBumper:
         wanted = _limited(pilot + pushed, GRAVITY * math.tan(self.settings.max_tilt))
         forward, left = cos * wanted[0] + sin * wanted[1], cos * wanted[1] - sin * wanted[0]
         return -math.atan(left / GRAVITY), math.atan(forward / GRAVITY)
+
+
+def _usable(stick: float, most: float) -> float:
+    """Limit a stick; neutral if it is not finite."""
+    return min(max(stick, -most), most) if math.isfinite(stick) else 0.0
 
 
 def _vector(name: str, values: ArrayLike) -> Array:

@@ -118,7 +118,7 @@ class OccupancyGrid:
         """Keep the carrier in the middle; what comes in at the edges is unknown."""
         half = (self._odds.shape[0] - 1) // 2
         low = np.array([origin[0], origin[1], origin[2] - self.settings.below])
-        corner = np.floor(low / self.settings.cell).astype(np.int64) - [half, half, 0]
+        corner = np.floor(low / self.settings.cell).astype(np.int64) - np.array([half, half, 0])
         if self._corner is not None and (corner != self._corner).any():
             self._shift(corner - self._corner)
         self._corner = corner

@@ -26,7 +26,10 @@ def histogram(
     """Stack the samples of each name over common bins, as shares of all samples."""
     total = max(1, sum(len(values) for values in samples.values()))
     counts = [np.histogram(values, edges)[0] / total for values in samples.values()]
-    ticks = nice_ticks(0.0, 1.15 * float(np.sum(counts, axis=0).max()), 4)
+    highest = float(np.sum(counts, axis=0).max())
+    ticks = nice_ticks(0.0, highest, 4)
+    if ticks[-1] < highest:
+        ticks.append(2 * ticks[-1] - ticks[-2])
     parts = [open_svg(_WIDTH, _HEIGHT, f"share of the time over {x_label}"), *_axes(edges, ticks)]
     below = np.zeros(len(edges) - 1)
     inks = [*SERIES_COLOURS, *_EXTRA]

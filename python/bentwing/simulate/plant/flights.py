@@ -98,7 +98,7 @@ def fly(
         for _ in range(SUBSTEPS):
             head.step(air, commands[0], CONTROL_STEP / SUBSTEPS)
         record[:, k] = head.rate, measured, wish, head.vanes
-    times = CONTROL_STEP * np.arange(1, n_steps + 1)
+    times = CONTROL_STEP * np.arange(1.0, n_steps + 1.0)
     return Flown(times, *record)
 
 

@@ -48,7 +48,8 @@ def outcomes(flown: Flown, lowest: float, highest: float) -> Outcomes:
     in_range = float(np.mean((rates >= lowest) & (rates <= highest)))
     low, middle, high = np.percentile(rates, [1.0, 50.0, 99.0]).tolist()
     stalled = np.abs(rates) < STALLED * flown.desired[first:]
-    return Outcomes(in_range, (low, middle, high), CONTROL_STEP * _longest_runs(stalled))
+    longest = CONTROL_STEP * _longest_runs(stalled).astype(np.float64)
+    return Outcomes(in_range, (low, middle, high), longest)
 
 
 def _longest_runs(flags: NDArray[np.bool_]) -> NDArray[np.int64]:

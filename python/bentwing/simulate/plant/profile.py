@@ -32,7 +32,7 @@ _LEAST_ACTIVITY = 0.02  # of the rotors, below which the head stands still
 def flight_air(flight: Flight, duration: float, rng: np.random.Generator, *, gusts: bool) -> Air:
     """Return the air that one flight meets at the controller's steps, as K carriers side by side."""
     n = int(np.ceil(knot_times(SPIN_STEP, duration)[-1] / CONTROL_STEP)) + 1
-    times = CONTROL_STEP * np.arange(n)
+    times = CONTROL_STEP * np.arange(float(n))
     motion = flight.motion(times)
     sigma = _GUSTY if gusts else _BREEZE
     wind = [ornstein_uhlenbeck(rng, n, CONTROL_STEP, _MEMORY, sigma) for _ in range(2)]

@@ -111,4 +111,4 @@ class StallWatch:
         if not self._was_turning or median >= STALLED * self._usual:
             self._slow_since = None
         elif self._slow_since is None:
-            self._slow_since = self._recent[0][0]
+            self._slow_since = time - BIN / 2  # the median follows half a window later

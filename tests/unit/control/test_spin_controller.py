@@ -100,7 +100,7 @@ def test_rich_structure_spins_faster_than_open_terrain():
     target = SpinTarget(slowest=math.radians(180.0), fastest=math.radians(400.0))
     assert target.rate(normals([1.0, 1.0, 1.0])) == pytest.approx(math.radians(400.0))
     assert target.rate(normals([0.02, 0.02, 1.0])) == pytest.approx(math.radians(180.0))
-    between = target.rate(normals([0.3, 0.3, 1.0]))
+    between = target.rate(normals([0.15, 0.15, 1.0]))
     assert math.radians(180.0) < between < math.radians(400.0)
 
 

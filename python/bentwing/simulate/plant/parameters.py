@@ -2,7 +2,8 @@
 """Sizes, masses and coefficients of the carrier and its spun head, each with where it is from.
 
 What Kaul 2015 states is taken from there (section 3); the rest is estimated from it, from textbook
-aerodynamics, or from data sheets of such parts, and says so. None was fitted to the paper's results.
+aerodynamics, or from data sheets of such parts, and says so. The vanes' exposure and the drag of
+their frame were estimated anew after first runs had shown more stalls than expected.
 """
 
 from __future__ import annotations

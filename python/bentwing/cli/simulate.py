@@ -36,6 +36,9 @@ def simulate_command(  # noqa: PLR0917 - one parameter per option
         str, Option("--format", help="bag (ROS 1), or mcap or db3 (ROS 2).")
     ] = "bag",
     motor_rate: Annotated[float, Option(help="Rate of vlp16-motor, rad/s.")] = 1.0,
+    spin: Annotated[
+        str, Option(help="Of hokuyo-spin: steady, or plant (downdraft, vanes and controller).")
+    ] = "steady",
     max_range: Annotated[
         float | None, Option(help="The lidar sees up to here, m.", show_default="the sensor's")
     ] = None,
@@ -51,6 +54,7 @@ def simulate_command(  # noqa: PLR0917 - one parameter per option
         "seed": seed,
         "format": bag_format,
         "motor_rate": motor_rate,
+        "spin": spin,
         "max_range": max_range,
         "events": event or (),
     }

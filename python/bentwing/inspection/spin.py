@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bentwing.control.stall import BIN, MIN_STALL, STALLED, TURNING
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-BIN = 0.25  # s; the median within is free of vibration, and a stall shorter than this is harmless
 SPINNING = 0.5  # rad/s, median; slower is the carrier's own motion
-STALLED = 0.25  # share of the usual rate
-MIN_STALL = 0.5  # s
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +63,7 @@ def _stalls(
     middles: NDArray[np.float64], medians: NDArray[np.float64], usual: float
 ) -> list[tuple[float, float]]:
     """Return the slow stretches between the first and the last turn: before and after is rest."""
-    turning = np.flatnonzero(medians > 0.5 * usual)
+    turning = np.flatnonzero(medians > TURNING * usual)
     slow = medians < STALLED * usual
     slow[: turning[0]] = slow[turning[-1] :] = False
     edges = np.flatnonzero(np.diff(np.concatenate([[0], slow.astype(np.int8), [0]])))

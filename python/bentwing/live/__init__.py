@@ -1,9 +1,39 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""Live use: batches as the sensors deliver them in, the pose now and the map so far out."""
+"""Live use: batches as the sensors deliver them in, the pose now and the map so far out.
 
+What acts on the flight is here under one name with it: `SpinController`, `VirtualBumper`, `StallWatch`.
+"""
+
+from bentwing.control import (
+    BumperCommand,
+    BumperSettings,
+    CarrierState,
+    SpinCommand,
+    SpinController,
+    SpinSettings,
+    SpinTarget,
+    Stall,
+    StallWatch,
+    VirtualBumper,
+)
 from bentwing.live.live_map import MapUpdate
 from bentwing.live.odometry import Odometry
 from bentwing.live.prediction import StampedPose
 from bentwing.live.status import Status
 
-__all__ = ["MapUpdate", "Odometry", "StampedPose", "Status"]
+__all__ = [
+    "BumperCommand",
+    "BumperSettings",
+    "CarrierState",
+    "MapUpdate",
+    "Odometry",
+    "SpinCommand",
+    "SpinController",
+    "SpinSettings",
+    "SpinTarget",
+    "Stall",
+    "StallWatch",
+    "StampedPose",
+    "Status",
+    "VirtualBumper",
+]

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 SceneName = Literal["courtyard", "office", "forest", "cave", "mine", "town"]
 HeadName = Literal["hokuyo-spin", "hokuyo-nod", "vlp16-fixed", "vlp16-motor"]
+SpinName = Literal["steady", "plant"]
 Format = Literal["bag", "mcap", "db3"]
 
 
@@ -40,6 +41,8 @@ class Scenario(BaseModel):
     seed : varies geometry, motion, calibration and noise
     format : of the recording: a ROS 1 bag, or a ROS 2 folder with mcap or sqlite storage
     motor_rate : rad/s, of a motor-turned head
+    spin : of `hokuyo-spin`: a `steady` rate that wanders a little, or driven by the simulated `plant`
+        of downdraft, vanes and controller
     max_range : m, beyond it the lidar sees nothing; by default what the sensor can do
     events : what goes wrong
     noiseless : without random errors of the sensors (calibration and clock stay wrong)
@@ -53,6 +56,7 @@ class Scenario(BaseModel):
     seed: int = Field(default=0, ge=0)
     format: Format = "bag"
     motor_rate: float = Field(default=1.0, gt=0.0, le=10.0)
+    spin: SpinName = "steady"
     max_range: float | None = Field(default=None, gt=1.0)
     events: tuple[EventName, ...] = ()
     noiseless: bool = False

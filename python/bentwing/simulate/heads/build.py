@@ -13,6 +13,7 @@ from bentwing.simulate.heads.hokuyo_nod import NOD_STEP, hokuyo_nod
 from bentwing.simulate.heads.hokuyo_spin import hokuyo_spin
 from bentwing.simulate.heads.rates import SPIN_STEP, spin_angle, spin_drive
 from bentwing.simulate.heads.vlp16 import MOTOR_STEP, vlp16_fixed, vlp16_motor
+from bentwing.simulate.plant.profile import driven_spin, flight_air
 from bentwing.simulate.rig import Head, Rig
 from bentwing.simulate.splines import knot_times
 from bentwing.simulate.trajectories import Flight, quadrotor_flight
@@ -48,7 +49,12 @@ def build_rig(scenario: Scenario, world: World, duration: float) -> Rig:
 def _spun(scenario: Scenario, flight: Flight, rng: np.random.Generator, duration: float) -> Head:
     drive = spin_drive(flight.activity(knot_times(SPIN_STEP, duration)))
     mean = np.radians(rng.uniform(220.0, 320.0))
-    spin = spin_angle(rng, mean, drive * _drive(scenario, SPIN_STEP, duration))
+    turning = _drive(scenario, SPIN_STEP, duration)
+    if scenario.spin == "plant":
+        air = flight_air(flight, duration, scenario.rng("air"), gusts="gusts" in scenario.events)
+        spin = driven_spin(air, mean, scenario.rng("spin"), turning)
+    else:
+        spin = spin_angle(rng, mean, drive * turning)
     return hokuyo_spin(rng, spin, scenario.max_range or HOKUYO_RANGE)
 
 

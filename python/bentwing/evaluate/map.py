@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bentwing.evaluate.robust import MAD_TO_STD
 from bentwing.map.thin import voxel_keys
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-MAD_TO_STD = 1.4826  # of a normal distribution
 MOST_PATCHES = 1000
 FEWEST_POINTS = 100  # in a patch
 _CLIP = 3.0  # standard deviations

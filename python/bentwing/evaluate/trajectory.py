@@ -11,6 +11,7 @@ import numpy as np
 from bentwing import geometry
 from bentwing.errors import InputError
 from bentwing.evaluate.alignment import Alignment, align, associate, without_frame_rotation
+from bentwing.evaluate.statistics import Statistics
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -21,28 +22,6 @@ if TYPE_CHECKING:
 
 Interval = tuple[float, float]
 _ODOMETER_STEP = 0.1  # s; the length of the way is measured in these, so that vibration adds none
-
-
-@dataclass(frozen=True, slots=True)
-class Statistics:
-    """Summary of errors, in their unit."""
-
-    rmse: float
-    mean: float
-    median: float
-    maximum: float
-    n: int
-
-    @classmethod
-    def of(cls, errors: NDArray[np.float64]) -> Statistics:
-        """Summarize errors `(N,)` that are not negative."""
-        return cls(
-            float(np.sqrt(np.mean(errors**2))),
-            float(errors.mean()),
-            float(np.median(errors)),
-            float(errors.max()),
-            len(errors),
-        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +107,7 @@ def absolute_error(
         Statistics.of(distances),
         float(np.sqrt(np.mean(errors[:, 0] ** 2 + errors[:, 1] ** 2))),
         float(np.sqrt(np.mean(errors[:, 2] ** 2))),
-        Statistics.of(_angles(truth.quats_xyzw, corrected.quats_xyzw)),
+        Statistics.of(angles(truth.quats_xyzw, corrected.quats_xyzw)),
         float(np.linalg.norm(geometry.log(frame))),
         truth.times,
         distances,
@@ -160,7 +139,7 @@ def relative_error(
     t_truth, q_truth = _motion(truth, start, end)
     return (
         Statistics.of(np.linalg.norm(t_estimate - t_truth, axis=1)),
-        Statistics.of(_angles(q_truth, q_estimate)),
+        Statistics.of(angles(q_truth, q_estimate)),
     )
 
 
@@ -242,10 +221,11 @@ def _motion(
     return geometry.rotate(back, p1 - p0), geometry.multiply(back, q1)
 
 
-def _angles(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+def angles(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Angles `(N,)` rad between orientations `(N, 4)`."""
     turns = geometry.log(geometry.multiply(geometry.inverse(a), b))
-    angles: NDArray[np.float64] = np.linalg.norm(turns, axis=1)
-    return angles
+    sizes: NDArray[np.float64] = np.linalg.norm(turns, axis=1)
+    return sizes
 
 
 def _odometer(truth: Trajectory) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""How dense a cloud is: the distance of each point to its nearest neighbour."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from bentwing.map.thin import voxel_keys
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from bentwing.evaluate.clouds import Cloud
+
+_BLOCK = 4.0  # m, edge of the cubes that are looked at
+_MARGIN = 0.25  # m; nearer to a face of its cube a point's neighbour may lie in the next one
+_MOST = 1_500_000  # points that are looked at
+
+
+@dataclass(frozen=True, slots=True)
+class PointSpacing:
+    """Distribution of the distances to the nearest neighbour, m.
+
+    Attributes
+    ----------
+    median, mean, p5, p95 : m
+    n_points : whose neighbours were looked for
+    distances : (N,) m
+    """
+
+    median: float
+    mean: float
+    p5: float
+    p95: float
+    n_points: int
+    distances: NDArray[np.float32] = field(metadata={"samples": True})
+
+
+def point_spacing(cloud: Cloud) -> PointSpacing | None:
+    """Measure the spacing of all points, or of those in cubes drawn at random.
+
+    Returns
+    -------
+    None where there are fewer than two points in every cube.
+
+    References
+    ----------
+    Kaul 2015, figure 23.
+    """
+    points, is_whole = _in_some_cubes(cloud)
+    if len(points) < 2:
+        return None
+    asked = points if is_whole else points[_inner(points)]
+    distances, _ = cKDTree(points).query(asked, k=2, workers=-1)
+    found = distances[:, 1]
+    if not len(found):
+        return None
+    p5, median, p95 = np.percentile(found, [5, 50, 95]).tolist()
+    return PointSpacing(median, float(found.mean()), p5, p95, len(found), found.astype(np.float32))
+
+
+def _in_some_cubes(cloud: Cloud) -> tuple[NDArray[np.float64], bool]:
+    """All points of as many cubes as memory allows, and whether these are all of the cloud."""
+    is_whole = cloud.n_points <= _MOST
+    if is_whole:
+        return np.concatenate(list(cloud.parts())), True
+    # the sample tells how many points a cube has
+    cubes, counts = np.unique(voxel_keys(cloud.sample.points, _BLOCK), return_counts=True)
+    order = np.random.default_rng(0).permutation(len(cubes))
+    share = cloud.n_points / max(len(cloud.sample.points), 1)
+    chosen = order[: max(1, int(np.searchsorted(np.cumsum(counts[order]) * share, _MOST)))]
+    kept = np.sort(cubes[chosen])
+    parts = [part[np.isin(voxel_keys(part, _BLOCK), kept)] for part in cloud.parts()]
+    return np.concatenate(parts), False
+
+
+def _inner(points: NDArray[np.float64]) -> NDArray[np.bool_]:
+    inside = np.abs(np.mod(points, _BLOCK) - _BLOCK / 2) < _BLOCK / 2 - _MARGIN
+    found: NDArray[np.bool_] = np.all(inside, axis=1)
+    return found

@@ -13,6 +13,11 @@ from typer.core import TyperCommand, TyperGroup
 COMMANDS = {
     "map": ("map", "map_command", "Turn a recording into a trajectory, a map and a report."),
     "info": ("info", "info", "Tell whether a recording is fit for mapping."),
+    "evaluate": (
+        "evaluate",
+        "evaluate_command",
+        "Measure the errors of a trajectory and a map.",
+    ),
     "simulate": ("simulate", "simulate_command", "Simulate a recording with truth."),
 }
 

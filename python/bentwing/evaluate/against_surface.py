@@ -72,6 +72,7 @@ class MapError:
         path of the sensor is not known
     R_reference_map, t_reference_map : found placement of the map in the reference's frame
     points, distances : (N, 3) m in the frame of the reference less `origin`, and (N,) m
+    viewpoints : (M, 3) m in the same frame, places of the sensor, or the middle
     origin : (3,) m
     """
 
@@ -91,6 +92,7 @@ class MapError:
     t_reference_map: list[float]
     points: NDArray[np.float64] = field(metadata=SAMPLES)
     distances: NDArray[np.float64] = field(metadata=SAMPLES)
+    viewpoints: NDArray[np.float64] = field(metadata=SAMPLES)
     origin: NDArray[np.float64] = field(metadata=SAMPLES)
 
 
@@ -148,7 +150,8 @@ def compare_with_map(
     near = [_between_origins(start, cloud.origin, reference.origin) for start in starts]
     placement = place(cloud.sample.points, surface, near)
     R, t = placement.R, placement.t
-    surface = surface.facing(_viewpoints(path, cloud, reference, placement))
+    viewpoints = _viewpoints(path, cloud, reference, placement)
+    surface = surface.facing(viewpoints)
     points = cloud.sample.points @ R.T + t
     distances, _ = surface.distances(points, threshold)
     measured = np.isfinite(distances)
@@ -172,6 +175,7 @@ def compare_with_map(
         t_reference_map=whole.t.tolist(),
         points=points,
         distances=distances,
+        viewpoints=viewpoints,
         origin=reference.origin,
     )
 

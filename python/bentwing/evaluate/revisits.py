@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bentwing.evaluate.robust import MAD_TO_STD
+from bentwing.evaluate.statistics import SAMPLES
 from bentwing.map.thin import voxel_keys
 
 if TYPE_CHECKING:
@@ -39,8 +40,8 @@ class Revisits:
     median: float
     p95: float
     n_patches: int
-    offsets: NDArray[np.float64] = field(metadata={"samples": True})
-    intervals: NDArray[np.float64] = field(metadata={"samples": True})
+    offsets: NDArray[np.float64] = field(metadata=SAMPLES)
+    intervals: NDArray[np.float64] = field(metadata=SAMPLES)
 
 
 def revisit_consistency(

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial import cKDTree
 
+from bentwing.evaluate.statistics import SAMPLES
 from bentwing.map.thin import voxel_keys
 
 if TYPE_CHECKING:
@@ -37,7 +38,7 @@ class PointSpacing:
     p5: float
     p95: float
     n_points: int
-    distances: NDArray[np.float32] = field(metadata={"samples": True})
+    distances: NDArray[np.float32] = field(metadata=SAMPLES)
 
 
 def point_spacing(cloud: Cloud) -> PointSpacing | None:

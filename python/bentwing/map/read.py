@@ -92,3 +92,5 @@ _READERS: dict[str, Callable[[Path], Iterator[Table]]] = {
     ".pcd": pcd_rows,
     ".e57": e57_scans,
 }
+
+MAP_SUFFIXES = tuple(_READERS)

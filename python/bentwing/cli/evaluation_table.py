@@ -56,7 +56,7 @@ def _trajectory(error: TrackError) -> list[Row]:
         *(
             (
                 f"difference in {name}",
-                f"{100 * box.mean:+.2f} ± {100 * box.std:.2f} cm",
+                f"{round(100 * box.mean, 2) + 0.0:.2f} ± {100 * box.std:.2f} cm",
                 _whiskers(box),
             )
             for name, box in error.axes.items()

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 THRESHOLD = 0.3  # m, of the paper: what is farther away has changed between the measurements
 _EDGES = (0.1, 0.5)  # m, least and greatest distance between surfels
-_SPACINGS = 5.0  # of the points of the reference, between surfels
+_SPACINGS = 10.0  # of the points of the reference, between surfels: two dozen points in each
 _FEWEST_SURFELS = 100
 _VIEWPOINTS_APART = 0.1  # m
 

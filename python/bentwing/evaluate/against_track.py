@@ -155,7 +155,10 @@ def _at_common_times(
     else:
         times, n_all = estimate.times[in_track], len(estimate.times)
     if len(times) < _FEWEST:
-        msg = f"estimate and reference share {len(times)} stamps; at least {_FEWEST} are needed"
+        msg = (
+            f"estimate and reference share {len(times)} stamps, at least {_FEWEST} are needed; is "
+            "the clock offset right?"
+        )
         raise InputError(msg)
     matched = Trajectory(times, *estimate.interpolate(times))
     if track.quats_xyzw is None:

@@ -32,7 +32,7 @@ class Cloud:
     sample : an even sample of points (K, 3) and times (K,); the times are zero without any
     """
 
-    def __init__(self, path: Path, sample_limit: int = 1_000_000) -> None:
+    def __init__(self, path: Path, sample_limit: int = 600_000) -> None:
         self.path = path
         self.origin: NDArray[np.float64] = np.zeros(3)
         self.n_points = self.n_not_finite = 0

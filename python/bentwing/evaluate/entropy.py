@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 RADIUS = 0.3  # m; what the name means in the literature
 _FEWEST = 15  # neighbours that give a covariance
-_ASKED = 4_000  # points, drawn at random
+_ASKED = 2_000  # points, drawn at random
 _MOST_NEIGHBOURS = 2_000  # of a point; of more, as many are drawn
 _FLATTEST = 1e-9  # m², so that exactly flat neighbourhoods have an entropy
 

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
     from bentwing.evaluate.clouds import Cloud
 
-_BLOCK = 4.0  # m, edge of the cubes that are looked at
-_MARGIN = 0.25  # m; nearer to a face of its cube a point's neighbour may lie in the next one
+_BLOCK = 4.0  # m, edge of the columns that are looked at
+_MARGIN = 0.25  # m; nearer to a face of its column a point's neighbour may lie in the next one
 _MOST = 1_500_000  # points that are looked at
 
 
@@ -42,17 +42,17 @@ class PointSpacing:
 
 
 def point_spacing(cloud: Cloud) -> PointSpacing | None:
-    """Measure the spacing of all points, or of those in cubes drawn at random.
+    """Measure the spacing of all points, or of those in columns drawn at random.
 
     Returns
     -------
-    None where there are fewer than two points in every cube.
+    None where there are fewer than two points.
 
     References
     ----------
     Kaul 2015, figure 23.
     """
-    points, is_whole = _in_some_cubes(cloud)
+    points, is_whole = _in_some_columns(cloud)
     if len(points) < 2:
         return None
     asked = points if is_whole else points[_inner(points)]
@@ -64,22 +64,24 @@ def point_spacing(cloud: Cloud) -> PointSpacing | None:
     return PointSpacing(median, float(found.mean()), p5, p95, len(found), found.astype(np.float32))
 
 
-def _in_some_cubes(cloud: Cloud) -> tuple[NDArray[np.float64], bool]:
-    """All points of as many cubes as memory allows, and whether these are all of the cloud."""
-    is_whole = cloud.n_points <= _MOST
-    if is_whole:
+def _in_some_columns(cloud: Cloud) -> tuple[NDArray[np.float64], bool]:
+    """All points of as many columns as memory allows, and whether these are all of the cloud."""
+    if cloud.n_points <= _MOST:
         return np.concatenate(list(cloud.parts())), True
-    # the sample tells how many points a cube has
-    cubes, counts = np.unique(voxel_keys(cloud.sample.points, _BLOCK), return_counts=True)
-    order = np.random.default_rng(0).permutation(len(cubes))
+    # the sample tells how many points a column has
+    columns, counts = np.unique(_column(cloud.sample.points), return_counts=True)
+    order = np.random.default_rng(0).permutation(len(columns))
     share = cloud.n_points / max(len(cloud.sample.points), 1)
-    chosen = order[: max(1, int(np.searchsorted(np.cumsum(counts[order]) * share, _MOST)))]
-    kept = np.sort(cubes[chosen])
-    parts = [part[np.isin(voxel_keys(part, _BLOCK), kept)] for part in cloud.parts()]
-    return np.concatenate(parts), False
+    fitting = int(np.searchsorted(np.cumsum(counts[order]) * share, _MOST))
+    kept = columns[order[: max(1, fitting)]]
+    return np.concatenate([part[np.isin(_column(part), kept)] for part in cloud.parts()]), False
+
+
+def _column(points: NDArray[np.float64]) -> NDArray[np.int64]:
+    return voxel_keys(points * np.array([1.0, 1.0, 0.0]), _BLOCK)
 
 
 def _inner(points: NDArray[np.float64]) -> NDArray[np.bool_]:
-    inside = np.abs(np.mod(points, _BLOCK) - _BLOCK / 2) < _BLOCK / 2 - _MARGIN
+    inside = np.abs(np.mod(points[:, :2], _BLOCK) - _BLOCK / 2) < _BLOCK / 2 - _MARGIN
     found: NDArray[np.bool_] = np.all(inside, axis=1)
     return found

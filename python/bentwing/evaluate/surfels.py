@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from bentwing.map.read_mesh import Mesh
 
 _FEWEST = 6  # points in a surfel
-_FLATTEST = 0.35  # thickness over the smaller width; thicker is an edge or a bush
+_FLATTEST = 0.25  # thickness over the smaller width; thicker is an edge or a bush
 _NARROWEST = 0.15  # of the voxel's edge: less spread sideways is a single scan line
 _RADIUS = 0.6  # of the edge: discs that touch their neighbours
 _MOST = 2_000_000  # surfels of a mesh

@@ -27,6 +27,7 @@ _ARM_SIGMA = 1.0  # m; how long a lever arm may be, for directions that the moti
 _ITERATIONS = 60
 _FIRST_LOOK = 12  # iterations that tell the right one of several offsets
 _MOST_USED = (1500, 20_000)  # measurements, evenly chosen: at the first look, and in the end
+_FINEST_SIGMA = 1e-4  # m; no reference is better, and weaker priors would drown in rounding
 _HALF_STEP = 0.02  # s, of numerical derivatives, across the vibration
 _CONVERGED = 1e-9  # m, rad and s
 _FEWEST = 10  # measurements for up to ten unknowns
@@ -86,6 +87,8 @@ def find_tracked_point(
     InputError
         If estimate and reference do not fit together at all.
     """
+    if clock_offset is not None and lever_arm is not None:
+        return TrackedPoint(clock_offset, None, None, lever_arm, None)
     stamped = (track.origin_ns - clock_origin_ns) / NS_PER_S
     arm = np.zeros(3) if lever_arm is None else np.array(lever_arm)
     starts = coarse_shifts(estimate, track) if clock_offset is None else [stamped - clock_offset]
@@ -166,7 +169,7 @@ def _fit(
         placed = points @ alignment.R.T + alignment.t
         residuals = placed - measured
         sizes = np.linalg.norm(residuals, axis=1)
-        sigma = max(scale(sizes) / np.sqrt(3), 1e-9)
+        sigma = max(scale(sizes) / np.sqrt(3), _FINEST_SIGMA)
         design = _design(placed, alignment.R, (velocities, quats), free)
         step, covariance = _solve(design, residuals, cauchy(sizes, 3 * sigma), (sigma, arm, free))
         turn = geometry.to_matrices(geometry.exp(step[:3]))

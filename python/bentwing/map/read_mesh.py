@@ -35,19 +35,22 @@ def read_mesh(path: Path) -> Mesh | None:
     """
     if path.suffix.lower() != ".ply":
         return None
-    with path.open("rb") as file:
-        lines = header_lines(path, file, "end_header")
-        n_vertices, n_faces = (_count(lines, name) for name in ("vertex", "face"))
-        if not n_faces:
-            return None
-        try:
+    try:
+        with path.open("rb") as file:
+            lines = header_lines(path, file, "end_header")
+            n_vertices, n_faces = (_count(lines, name) for name in ("vertex", "face"))
+            if not n_faces:
+                return None
             vertices, triangles = _tables(lines, file, n_vertices, n_faces)
-        except (ValueError, KeyError, IndexError) as error:
-            msg = (
-                f"{path}: its faces are not readable ({error}); write a mesh of triangles as binary "
-                "little-endian PLY without further properties of the faces, or the points alone"
-            )
-            raise InputError(msg) from error
+    except OSError as error:
+        msg = f"{path}: not readable ({error.strerror})"
+        raise InputError(msg) from error
+    except (ValueError, KeyError, IndexError) as error:
+        msg = (
+            f"{path}: its faces are not readable ({error}); write a mesh of triangles as binary "
+            "little-endian PLY without further properties of the faces, or the points alone"
+        )
+        raise InputError(msg) from error
     if len(vertices) and np.isfinite(vertices).all() and triangles.max() < len(vertices):
         return Mesh(vertices, triangles)
     msg = f"{path}: its triangles name vertices that are not there or not finite; it is damaged"

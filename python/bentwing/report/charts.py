@@ -57,7 +57,7 @@ def histogram(
     edges = np.linspace(*span, _BINS + 1)
     shares = [100 * np.histogram(s.values, edges)[0] / len(s.values) for s in samples]
     axes = fit_axes(span, (0.0, max(float(share.max()) for share in shares)), (WIDTH, HEIGHT))
-    parts = _frame(axes, x_label, f"share per {_width(edges)}, %")
+    parts = _frame(axes, x_label, "share per bin, %")
     for share, ink in zip(shares, SERIES_COLOURS, strict=False):
         x = np.repeat(edges, 2)
         y = np.concatenate([[0.0], np.repeat(share, 2), [0.0]])
@@ -169,7 +169,3 @@ def _legend(names: Sequence[str], axes: Axes) -> list[str]:
         text(axes.right - 6, 42 + 16 * i, name, "end", ink)
         for i, (name, ink) in enumerate(zip(names, SERIES_COLOURS, strict=False))
     ]
-
-
-def _width(edges: NDArray[np.float64]) -> str:
-    return f"{edges[1] - edges[0]:.2g}"

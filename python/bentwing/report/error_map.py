@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 _CM = 100.0
 _REACH = 3.0  # standard deviations at the ends of the colour map
+_CELL = 0.05  # m, edge of the voxels whose points share their mean
 _HEADROOM = 0.3  # m above the sensor from which on a point counts as overhead
 _COLUMN = 1.0  # m, edge of the columns in which a roof is looked for
 _ROOFED_SHARE = 0.5  # of the places of the sensor
@@ -30,16 +31,18 @@ _ROOFED_SHARE = 0.5  # of the places of the sensor
 def draw_error_map(error: MapError) -> str:
     """Plan of the map, blue in front of the reference and red behind it.
 
+    Every voxel has the mean of its points: of single ones only those in front would be seen.
+
     References
     ----------
     Kaul 2015, figure 21d.
     """
     seen = ~_overhead(error)
-    points, distances = error.points[seen], _CM * error.distances[seen]
+    points, distances = error.points[seen], _averaged(error.points[seen], error.distances[seen])
     reach = max(round(_REACH * _CM * error.robust_std, 1), 0.1)
     projection = project(*points.T, width=1000, max_height=800)
-    view = paint(projection, distances, table=ERROR, shading=0.6, span=(-reach, reach))
-    return map_view(view, "in front, cm, behind", ERROR, name="Map by distance from the reference")
+    view = paint(projection, _CM * distances, table=ERROR, shading=0.6, span=(-reach, reach))
+    return map_view(view, "error, cm", ERROR, name="Map by distance from the reference")
 
 
 def write_error_cloud(path: Path, error: MapError) -> None:
@@ -67,6 +70,13 @@ def write_error_cloud(path: Path, error: MapError) -> None:
     with atomic_path(path) as temporary, temporary.open("wb") as file:
         file.write("\n".join(header).encode("ascii"))
         rows.tofile(file)
+
+
+def _averaged(points: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Give every point the mean value of its voxel."""
+    _, voxel = np.unique(voxel_keys(points, _CELL), return_inverse=True)
+    mean: NDArray[np.float64] = np.bincount(voxel, values) / np.bincount(voxel)
+    return mean[voxel]
 
 
 def _overhead(error: MapError) -> NDArray[np.bool_]:

@@ -134,7 +134,8 @@ def _alone(evaluation: Evaluation) -> dict[str, str]:
 
 
 def _mean_and_std(values: np.ndarray, unit: str) -> str:
-    return f"mean {values.mean():+.2f}, std {values.std():.2f} {unit}"
+    # adding zero takes the sign from a negative zero
+    return f"mean {round(values.mean(), 2) + 0.0:.2f}, std {values.std():.2f} {unit}"
 
 
 def _nice(value: float) -> float:

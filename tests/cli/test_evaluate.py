@@ -49,6 +49,7 @@ def run_folder(tmp_path):
         points = rng.uniform(0, 6, (30_000, 3))
         side = rng.integers(0, 3, len(points))
         points[np.arange(len(points)), side] = rng.normal(0, noise, len(points)) if noise else 0.0
+        points += 0.3  # off the faces of the cubes that the measures cut maps into
         times = np.where(rng.uniform(size=len(points)) < 0.5, 1.0, 50.0) + rng.uniform(
             0, 1, len(points)
         )

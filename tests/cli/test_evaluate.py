@@ -149,6 +149,7 @@ def test_a_total_station_as_csv_is_matched_in_time_and_place(bentwing, run_folde
 
 
 def test_figures_of_an_earlier_evaluation_do_not_stay(bentwing, run_folder):
+    (run_folder / "map.ply").unlink()
     reference = ("--reference-trajectory", run_folder.parent / "truth.txt")
     assert bentwing("evaluate", run_folder, *reference, "--quiet").code == 0
     assert bentwing("evaluate", run_folder, "--quiet").code == 0

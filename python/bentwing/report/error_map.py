@@ -74,7 +74,8 @@ def write_error_cloud(path: Path, error: MapError) -> None:
 
 def _averaged(points: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Give every point the mean value of its voxel."""
-    _, voxel = np.unique(voxel_keys(points, _CELL), return_inverse=True)
+    # floors often lie at round heights: these are in the middle of a voxel, not on its face
+    _, voxel = np.unique(voxel_keys(points + _CELL / 2, _CELL), return_inverse=True)
     mean: NDArray[np.float64] = np.bincount(voxel, values) / np.bincount(voxel)
     return mean[voxel]
 

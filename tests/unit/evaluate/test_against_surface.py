@@ -82,9 +82,9 @@ def test_where_two_walls_meet_a_point_belongs_to_the_nearer_one():
 
 @pytest.mark.parametrize("origin", [np.zeros(3), GEOGRAPHIC], ids=["local", "geographic"])
 def test_a_map_is_brought_to_its_reference_from_anywhere(hall, written, origin):
-    reference = read_reference(written(hall(150_000, noise=0.002) + origin, "reference.ply"))
+    reference = read_reference(written(hall(90_000, noise=0.002) + origin, "reference.ply"))
     R = geometry.to_matrices(geometry.exp(np.array([0.01, -0.02, 2.5])))
-    moved = (hall(60_000, noise=0.01, seed=1) - [4.0, 3, 1]) @ R.T
+    moved = (hall(30_000, noise=0.01, seed=1) - [4.0, 3, 1]) @ R.T
     found = compare_with_map(Cloud(written(moved)), reference)
     assert np.abs(np.array(found.R_reference_map) - R.T).max() < 5e-4
     expected = np.array([4.0, 3, 1]) + origin
@@ -98,10 +98,10 @@ def test_a_map_is_brought_to_its_reference_from_anywhere(hall, written, origin):
 
 def test_known_offset_between_two_planes_is_the_mean_and_changed_things_are_left_out(hall, written):
     """All sides moved outwards by 2 cm, which no rigid motion can undo, and a new pillar."""
-    reference = read_reference(written(hall(150_000), "reference.ply"))
+    reference = read_reference(written(hall(90_000), "reference.ply"))
     rng = np.random.default_rng(5)
-    pillar = np.array([2.0, 6, 0.4]) + rng.uniform(0, 1, (3_000, 3)) * [0.5, 0.5, 2.2]
-    points = np.vstack([hall(57_000, offset=0.02, noise=0.004, seed=2), pillar])
+    pillar = np.array([2.0, 6, 0.4]) + rng.uniform(0, 1, (1_500, 3)) * [0.5, 0.5, 2.2]
+    points = np.vstack([hall(28_500, offset=0.02, noise=0.004, seed=2), pillar])
     found = compare_with_map(Cloud(written(points)), reference, path=path_through())
     assert found.front == "sensor"
     # the floor goes down and opposite walls apart: behind the reference as seen from inside;
@@ -114,8 +114,8 @@ def test_known_offset_between_two_planes_is_the_mean_and_changed_things_are_left
 
 
 def test_completeness_is_the_share_that_was_mapped(hall, written):
-    reference = read_reference(written(hall(150_000), "reference.ply"))
-    half = hall(150_000, noise=0.003, seed=4)
+    reference = read_reference(written(hall(90_000), "reference.ply"))
+    half = hall(90_000, noise=0.003, seed=4)
     found = compare_with_map(Cloud(written(half[half[:, 0] < 4])), reference)
     whole = reference.surfels.centres + reference.origin
     assert found.completeness == pytest.approx(np.mean(whole[:, 0] < 4), abs=0.02)

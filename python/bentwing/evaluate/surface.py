@@ -31,22 +31,20 @@ class Surface:
     Parameters
     ----------
     surfels : of the reference
+    tree : of their centres, if there is one already
     """
 
-    def __init__(self, surfels: Surfels) -> None:
+    def __init__(self, surfels: Surfels, tree: cKDTree | None = None) -> None:
         self.surfels = surfels
-        self._tree = cKDTree(surfels.centres)
+        self._tree = cKDTree(surfels.centres) if tree is None else tree
 
     def facing(self, viewpoints: NDArray[np.float64]) -> Surface:
         """Return the same with all normals turned to the nearest of viewpoints `(M, 3)`."""
         _, nearest = cKDTree(viewpoints).query(self.surfels.centres, workers=-1)
         toward = viewpoints[nearest] - self.surfels.centres
         away = np.einsum("ni,ni->n", toward, self.surfels.normals) < 0
-        turned = object.__new__(Surface)
-        turned._tree = self._tree
         normals = np.where(away[:, None], -self.surfels.normals, self.surfels.normals)
-        turned.surfels = replace(self.surfels, normals=normals)
-        return turned
+        return Surface(replace(self.surfels, normals=normals), self._tree)
 
     def distances(
         self, points: NDArray[np.float64], limit: float

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""Errors of a trajectory against the truth: absolute, relative, and drift per metre."""
+"""Errors of a trajectory against the truth on one clock: absolute, and drift per metre."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bentwing import geometry
-from bentwing.errors import InputError
 from bentwing.evaluate.alignment import Alignment, align, associate, without_frame_rotation
 from bentwing.evaluate.statistics import Statistics
 
@@ -112,34 +111,6 @@ def absolute_error(
         truth.times,
         distances,
         alignment,
-    )
-
-
-def relative_error(
-    estimate: Trajectory,
-    truth: Trajectory,
-    *,
-    interval: float = 1.0,
-    during: Interval | None = None,
-) -> tuple[Statistics, Statistics]:
-    """Relative pose error: how well the motion over `interval` seconds is known.
-
-    Returns
-    -------
-    translation : m
-    rotation : rad, both of the motions that begin at every stamp of the truth
-    """
-    estimate, truth = _comparable(estimate, truth, during)
-    start = truth.times[truth.times <= truth.times[-1] - interval + 1e-9]
-    if not len(start):
-        msg = f"the trajectories share less than the {interval:g} s over which motion is compared"
-        raise InputError(msg)
-    end = np.minimum(start + interval, truth.times[-1])
-    t_estimate, q_estimate = _motion(estimate, start, end)
-    t_truth, q_truth = _motion(truth, start, end)
-    return (
-        Statistics.of(np.linalg.norm(t_estimate - t_truth, axis=1)),
-        Statistics.of(angles(q_truth, q_estimate)),
     )
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bentwing.atomic import write_text
+from bentwing.evaluate.robust import Line
 from bentwing.report.charts import BoxGroup, Sample, box_plot, histogram, scatter
 from bentwing.report.error_map import draw_error_map, write_error_cloud
 from bentwing.report.plot import Series, line_plot
@@ -49,7 +50,7 @@ def _trajectory(error: TrackError) -> dict[str, str]:
         for i, name in enumerate("xyz")
     ]
     line = error.error_over_speed
-    scaled = None if line is None else type(line)(_CM * line.slope, _CM * line.intercept)
+    scaled = None if line is None else Line(_CM * line.slope, _CM * line.intercept)
     top = float(np.percentile(distances, 99.5)) * 1.1
     labels = ("speed of the platform, m/s", "distance to the reference, cm")
     return {

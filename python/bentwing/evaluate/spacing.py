@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 
     from bentwing.evaluate.clouds import Cloud
 
-_BLOCK = 4.0  # m, edge of the columns that are looked at
+_BLOCK = 2.0  # m, edge of the columns that are looked at
 _MARGIN = 0.25  # m; nearer to a face of its column a point's neighbour may lie in the next one
-_MOST = 1_500_000  # points that are looked at
+_MOST = 2_000_000  # points that are looked at, about
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,12 +68,10 @@ def _in_some_columns(cloud: Cloud) -> tuple[NDArray[np.float64], bool]:
     """All points of as many columns as memory allows, and whether these are all of the cloud."""
     if cloud.n_points <= _MOST:
         return np.concatenate(list(cloud.parts())), True
-    # the sample tells how many points a column has
-    columns, counts = np.unique(_column(cloud.sample.points), return_counts=True)
-    order = np.random.default_rng(0).permutation(len(columns))
-    share = cloud.n_points / max(len(cloud.sample.points), 1)
-    fitting = int(np.searchsorted(np.cumsum(counts[order]) * share, _MOST))
-    kept = columns[order[: max(1, fitting)]]
+    # a share of the columns, not columns up to a number of points, which would avoid dense ones
+    columns = np.unique(_column(cloud.sample.points))
+    n_kept = max(1, round(len(columns) * _MOST / cloud.n_points))
+    kept = np.random.default_rng(0).choice(columns, n_kept, replace=False)
     return np.concatenate([part[np.isin(_column(part), kept)] for part in cloud.parts()]), False
 
 

@@ -18,6 +18,7 @@ from bentwing.errors import InputError
 from bentwing.evaluate.map import surface_error
 from bentwing.evaluate.trajectory import absolute_error, drift
 from bentwing.map.gps_time import adjusted_gps_origin
+from bentwing.map.read_mesh import read_mesh
 from bentwing.preprocess import preprocess
 from bentwing.recording import LidarBatch, Payload, Recording
 from bentwing.trajectory import Trajectory, read_tum
@@ -131,14 +132,12 @@ def sampled(points: np.ndarray) -> np.ndarray:
 
 
 def read_scene(path: Path) -> Scene:
-    """The mesh as the simulator writes it: double vertices, triangles only."""
-    header, body = path.read_bytes().split(b"end_header\n", 1)
-    n_vertices, n_faces = (
-        int(line.split()[2]) for line in header.decode().splitlines() if line.startswith("element")
-    )
-    vertices = np.frombuffer(body, "<f8", 3 * n_vertices).reshape(-1, 3)
-    faces = np.frombuffer(body, [("n", "u1"), ("corners", "<u4", 3)], n_faces, 24 * n_vertices)
-    return Scene(np.array(vertices, float), np.array(faces["corners"], np.uint32))
+    """The mesh as the simulator writes it."""
+    mesh = read_mesh(path)
+    if mesh is None:
+        msg = f"{path}: holds no triangles"
+        raise InputError(msg)
+    return Scene(mesh.vertices, mesh.triangles)
 
 
 def best_points(

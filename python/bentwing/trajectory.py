@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 _TUM_COLUMNS = 8
+_LATEST_NS = 2**62  # beyond it differences of stamps overflow
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,14 +139,11 @@ def read_tum(path: Path, clock_origin_ns: int | None = None) -> tuple[Trajectory
     InputError
         If the file cannot be read, a line has no eight numbers, or the stamps do not increase.
     """
-    stamps_ns, poses = _parse_tum(Path(path))
-    origin = stamps_ns[0] if clock_origin_ns is None else clock_origin_ns
-    relative_ns = np.array([stamp - origin for stamp in stamps_ns], dtype=np.int64)
-    late = np.diff(relative_ns) <= 0
-    if late.any():
-        msg = f"{path}: stamps must increase, pose {int(np.argmax(late)) + 2} does not"
-        raise InputError(msg)
-    values = np.array(poses)
+    stamps_ns, values = read_stamped_rows(
+        Path(path), (_TUM_COLUMNS,), "t x y z qx qy qz qw", ignore_more=True
+    )
+    origin = int(stamps_ns[0]) if clock_origin_ns is None else clock_origin_ns
+    relative_ns = stamps_ns - origin
     lengths = np.linalg.norm(values[:, 3:], axis=1, keepdims=True)
     if not np.isfinite(values).all() or (lengths == 0).any():
         msg = f"{path}: a pose is not finite or has a quaternion of length zero"
@@ -153,29 +151,62 @@ def read_tum(path: Path, clock_origin_ns: int | None = None) -> tuple[Trajectory
     return Trajectory(relative_ns / NS_PER_S, values[:, :3].copy(), values[:, 3:] / lengths), origin
 
 
-def _parse_tum(path: Path) -> tuple[list[int], list[list[float]]]:
+def read_stamped_rows(
+    path: Path, widths: tuple[int, ...], layout: str, *, ignore_more: bool = False
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Read lines of a stamp in seconds and numbers; commas count as spaces, # begins a comment.
+
+    A first line that names the columns (`t,x,y,z`) is left out.
+
+    Parameters
+    ----------
+    path : file to read
+    widths : numbers of columns, stamp included, of which all lines have one
+    layout : names the columns in the messages
+    ignore_more : leave out columns beyond the widest
+
+    Returns
+    -------
+    stamps_ns : (N,) int64, increasing, N > 0
+    values : (N, width - 1) float64
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, a line has another form, or the stamps do not increase.
+    """
     try:
         lines = path.read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         msg = f"{path}: not readable as a trajectory ({error})"
         raise InputError(msg) from error
     stamps_ns: list[int] = []
-    poses: list[list[float]] = []
+    rows: list[list[float]] = []
     for number, line in enumerate(lines, start=1):
         fields = line.replace(",", " ").split()
-        if not fields or fields[0].startswith("#"):
+        if not fields or fields[0].startswith("#") or (not rows and _is_heading(fields)):
             continue
+        fields = fields[: max(widths)] if ignore_more else fields
+        expected = (len(rows[0]) + 1,) if rows else widths
         try:
-            stamp, *pose = fields[:_TUM_COLUMNS]
-            stamps_ns.append(int((Decimal(stamp) * NS_PER_S).to_integral_value()))
-            poses.append([float(value) for value in pose])
-            complete = len(pose) == _TUM_COLUMNS - 1
+            stamps_ns.append(int((Decimal(fields[0]) * NS_PER_S).to_integral_value()))
+            rows.append([float(value) for value in fields[1:]])
+            complete = len(fields) in expected and abs(stamps_ns[-1]) < _LATEST_NS
         except (InvalidOperation, ValueError, OverflowError):
             complete = False
         if not complete:
-            msg = f"{path}, line {number}: expected `t x y z qx qy qz qw`, found {line[:80]!r}"
+            msg = f"{path}, line {number}: expected `{layout}`, found {line[:80]!r}"
             raise InputError(msg)
     if not stamps_ns:
-        msg = f"{path}: holds no pose; expected lines of `t x y z qx qy qz qw`"
+        msg = f"{path}: holds no pose; expected lines of `{layout}`"
         raise InputError(msg)
-    return stamps_ns, poses
+    stamps = np.array(stamps_ns, dtype=np.int64)
+    late = np.diff(stamps) <= 0
+    if late.any():
+        msg = f"{path}: stamps must increase, pose {int(np.argmax(late)) + 2} does not"
+        raise InputError(msg)
+    return stamps, np.array(rows)
+
+
+def _is_heading(fields: list[str]) -> bool:
+    return fields[0].lower() in {"t", "time", "stamp", "timestamp"}

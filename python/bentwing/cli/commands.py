@@ -14,6 +14,11 @@ COMMANDS = {
     "map": ("map", "map_command", "Turn a recording into a trajectory, a map and a report."),
     "info": ("info", "info", "Tell whether a recording is fit for mapping."),
     "plan": ("plan", "plan_command", "Plan a flight: how fast to spin, what will be seen."),
+    "evaluate": (
+        "evaluate",
+        "evaluate_command",
+        "Measure the errors of a trajectory and a map.",
+    ),
     "simulate": ("simulate", "simulate_command", "Simulate a recording with truth."),
     "reproduce": ("reproduce", "reproduce_command", "Make a paper's figures and tables again."),
 }

@@ -3,17 +3,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bentwing.evaluate.robust import MAD_TO_STD
+from bentwing.evaluate.statistics import SAMPLES
 from bentwing.map.thin import voxel_keys
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-MAD_TO_STD = 1.4826  # of a normal distribution
 MOST_PATCHES = 1000
 FEWEST_POINTS = 100  # in a patch
 _CLIP = 3.0  # standard deviations
@@ -60,8 +61,8 @@ class Thickness:
     p25: float
     p75: float
     p90: float
-    centres: NDArray[np.float64]
-    stds: NDArray[np.float64]
+    centres: NDArray[np.float64] = field(metadata=SAMPLES)
+    stds: NDArray[np.float64] = field(metadata=SAMPLES)
 
 
 def surface_error(

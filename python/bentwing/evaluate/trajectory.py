@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""Errors of a trajectory against the truth: absolute, relative, and drift per metre."""
+"""Errors of a trajectory against the truth on one clock: absolute, and drift per metre."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bentwing import geometry
-from bentwing.errors import InputError
 from bentwing.evaluate.alignment import Alignment, align, associate, without_frame_rotation
+from bentwing.evaluate.statistics import Statistics
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -21,28 +21,6 @@ if TYPE_CHECKING:
 
 Interval = tuple[float, float]
 _ODOMETER_STEP = 0.1  # s; the length of the way is measured in these, so that vibration adds none
-
-
-@dataclass(frozen=True, slots=True)
-class Statistics:
-    """Summary of errors, in their unit."""
-
-    rmse: float
-    mean: float
-    median: float
-    maximum: float
-    n: int
-
-    @classmethod
-    def of(cls, errors: NDArray[np.float64]) -> Statistics:
-        """Summarize errors `(N,)` that are not negative."""
-        return cls(
-            float(np.sqrt(np.mean(errors**2))),
-            float(errors.mean()),
-            float(np.median(errors)),
-            float(errors.max()),
-            len(errors),
-        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,39 +106,11 @@ def absolute_error(
         Statistics.of(distances),
         float(np.sqrt(np.mean(errors[:, 0] ** 2 + errors[:, 1] ** 2))),
         float(np.sqrt(np.mean(errors[:, 2] ** 2))),
-        Statistics.of(_angles(truth.quats_xyzw, corrected.quats_xyzw)),
+        Statistics.of(angles(truth.quats_xyzw, corrected.quats_xyzw)),
         float(np.linalg.norm(geometry.log(frame))),
         truth.times,
         distances,
         alignment,
-    )
-
-
-def relative_error(
-    estimate: Trajectory,
-    truth: Trajectory,
-    *,
-    interval: float = 1.0,
-    during: Interval | None = None,
-) -> tuple[Statistics, Statistics]:
-    """Relative pose error: how well the motion over `interval` seconds is known.
-
-    Returns
-    -------
-    translation : m
-    rotation : rad, both of the motions that begin at every stamp of the truth
-    """
-    estimate, truth = _comparable(estimate, truth, during)
-    start = truth.times[truth.times <= truth.times[-1] - interval + 1e-9]
-    if not len(start):
-        msg = f"the trajectories share less than the {interval:g} s over which motion is compared"
-        raise InputError(msg)
-    end = np.minimum(start + interval, truth.times[-1])
-    t_estimate, q_estimate = _motion(estimate, start, end)
-    t_truth, q_truth = _motion(truth, start, end)
-    return (
-        Statistics.of(np.linalg.norm(t_estimate - t_truth, axis=1)),
-        Statistics.of(_angles(q_truth, q_estimate)),
     )
 
 
@@ -242,10 +192,11 @@ def _motion(
     return geometry.rotate(back, p1 - p0), geometry.multiply(back, q1)
 
 
-def _angles(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+def angles(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Angles `(N,)` rad between orientations `(N, 4)`."""
     turns = geometry.log(geometry.multiply(geometry.inverse(a), b))
-    angles: NDArray[np.float64] = np.linalg.norm(turns, axis=1)
-    return angles
+    sizes: NDArray[np.float64] = np.linalg.norm(turns, axis=1)
+    return sizes
 
 
 def _odometer(truth: Trajectory) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

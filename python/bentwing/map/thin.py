@@ -68,6 +68,12 @@ def voxel_keys(points: NDArray[np.float64], edge: float) -> NDArray[np.int64]:
     return keys
 
 
+def voxel_cells(keys: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the cells `(N, 3)` of the numbers of voxels, of those nearest to the origin."""
+    cells = np.stack([keys >> 2 * _BITS, keys >> _BITS, keys], axis=1) & _MASK
+    return cells - ((cells >> (_BITS - 1)) << _BITS)
+
+
 class VoxelSet:
     """Set of int64 keys that grows by whole arrays, at 8 bytes per key.
 

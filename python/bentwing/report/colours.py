@@ -19,7 +19,8 @@ HEIGHT = (
 TIME = (
     "0d0887", "4c02a1", "7e03a8", "a92395", "cc4778", "e56b5d", "f89540", "fdc527", "f0f921",
 )  # fmt: skip
-
+# Moreland 2009, a diverging map: blue is below zero, red above.
+ERROR = ("3b4cc0", "7b9ff9", "c0d4f5", "dddddd", "f2cbb7", "ee8468", "b40426")
 
 _SHADES = 1024  # of a colour map; neighbours differ by less than one of 256 levels
 

@@ -122,17 +122,21 @@ def paint(
     *,
     table: tuple[str, ...] = HEIGHT,
     shading: float = 1.0,
+    span: tuple[float, float] | None = None,
 ) -> View:
     """Colour what is seen.
 
     Parameters
     ----------
     seen : the projection of N points
-    values : (N,) what the colour shows; its central 98 % span the colour map
+    values : (N,) what the colour shows
     table : colour map
     shading : 0 for flat colours, 1 for full eye-dome lighting
+    span : values at the ends of the colour map; default: of the central 98 %
     """
-    low, high = np.percentile(thinned(values), [1, 99]) if len(values) else (0.0, 1.0)
+    if span is None:
+        span = tuple(np.percentile(thinned(values), [1, 99])) if len(values) else (0.0, 1.0)
+    low, high = span
     filled = np.flatnonzero(seen.front >= 0)
     shade = (values[seen.front.ravel()[filled]] - low) / max(high - low, 1e-9)
     light = 1 - shading * (1 - seen.light.ravel()[filled])

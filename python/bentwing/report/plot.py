@@ -8,16 +8,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing.report.svg import FAINT, GRID, nice_ticks, number, open_svg, text
+from bentwing.report.axes import fit_axes
+from bentwing.report.svg import open_svg, text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
+    from bentwing.report.axes import Axes
+
 SERIES_COLOURS = ("#2c5f8a", "#c8553d", "#4d8b57", "#8a6d3b")
 _MOST_POINTS = 1200  # of one line; more are drawn as their envelope
-_LEFT, _RIGHT, _UPPER, _LOWER = 58.0, 12.0, 26.0, 40.0  # margins, pixels
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,65 +61,18 @@ def line_plot(
     ]
     legend = axes.right
     for line, ink in reversed(list(zip(lines, SERIES_COLOURS, strict=False))):
-        parts.append(axes.polyline(line, ink))
+        parts.append(axes.polyline(*_envelope(line), ink))
         if len(lines) > 1:
             parts.append(text(legend, 13, line.name, "end", ink))
             legend -= 7.0 * len(line.name) + 14
     return "".join([*parts, "</svg>"])
 
 
-@dataclass(frozen=True, slots=True)
-class _Axes:
-    x_low: float
-    x_high: float
-    x_ticks: list[float]
-    y_ticks: list[float]
-    right: float
-    lower: float
-
-    def place(self, x: float, y: float) -> tuple[float, float]:
-        low, high = self.y_ticks[0], self.y_ticks[-1]
-        across = (x - self.x_low) / max(self.x_high - self.x_low, 1e-12)
-        up = (y - low) / max(high - low, 1e-12)
-        return _LEFT + across * (self.right - _LEFT), self.lower - up * (self.lower - _UPPER)
-
-    def polyline(self, line: Series, ink: str) -> str:
-        pairs = zip(*_envelope(line), strict=True)
-        points = " ".join("{:.1f},{:.1f}".format(*self.place(x, y)) for x, y in pairs)
-        style = f'fill="none" stroke="{ink}" stroke-width="1.4" stroke-linejoin="round"'
-        return f'<polyline points="{points}" {style}/>'
-
-    def drawn(self) -> list[str]:
-        right, lower = self.right, self.lower
-        parts = []
-        for tick in self.y_ticks:
-            _, y = self.place(self.x_low, tick)
-            parts += [
-                f'<line x1="{_LEFT}" x2="{right}" y1="{y:.1f}" y2="{y:.1f}" stroke="{GRID}"/>',
-                text(_LEFT - 8, y + 4, number(tick), "end"),
-            ]
-        for tick in self.x_ticks:
-            x, _ = self.place(tick, self.y_ticks[0])
-            parts += [
-                f'<line x1="{x:.1f}" x2="{x:.1f}" y1="{lower}" y2="{lower + 4}" stroke="{FAINT}"/>',
-                text(x, lower + 18, number(tick), "middle"),
-            ]
-        return parts
-
-
-def _axes(lines: list[Series], size: tuple[int, int], top: float | None) -> _Axes:
-    x_low, x_high = min(line.x.min() for line in lines), max(line.x.max() for line in lines)
+def _axes(lines: list[Series], size: tuple[int, int], top: float | None) -> Axes:
+    x = min(line.x.min() for line in lines), max(line.x.max() for line in lines)
     y_low = min(0.0, *(float(line.y.min()) for line in lines))
     y_high = max(0.0, *(float(line.y.max()) for line in lines)) if top is None else top
-    y_ticks = nice_ticks(y_low, y_high, 4)
-    step = y_ticks[1] - y_ticks[0] if len(y_ticks) > 1 else 1.0
-    # the axis ends at round numbers that hold everything
-    if y_ticks[0] > y_low + 1e-9 * step:
-        y_ticks.insert(0, y_ticks[0] - step)
-    if y_ticks[-1] < y_high - 1e-9 * step:
-        y_ticks.append(y_ticks[-1] + step)
-    x_ticks = nice_ticks(float(x_low), float(x_high), 7)
-    return _Axes(float(x_low), float(x_high), x_ticks, y_ticks, size[0] - _RIGHT, size[1] - _LOWER)
+    return fit_axes((float(x[0]), float(x[1])), (y_low, y_high), size)
 
 
 def _finite(line: Series) -> Series:

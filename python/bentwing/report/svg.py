@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import base64
 import math
+import re
 from html import escape
 from typing import TYPE_CHECKING
 
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 
 INK, FAINT, GRID = "#3c4653", "#6b7684", "#e4e8ed"
 _MOST_POINTS = 1200  # of a path
+_VIEW_BOX = re.compile(r'viewBox="0 0 (\d+) (\d+)"')
 
 
 def map_view(
@@ -119,6 +121,21 @@ def open_svg(width: int, height: int, name: str) -> str:
     return (
         f'<svg viewBox="0 0 {width} {height}" role="img" aria-label="{escape(name, quote=True)}" '
         'xmlns="http://www.w3.org/2000/svg">'
+    )
+
+
+def standalone(drawing: str) -> str:
+    """Make a drawing a file of its own: with its size, a font, and paper below."""
+    size = _VIEW_BOX.search(drawing)
+    if size is None:
+        msg = "drawing: expected an SVG with a view box"
+        raise ValueError(msg)
+    width, height = size.groups()
+    opening, rest = drawing.split(">", 1)
+    return (
+        f'{opening} width="{width}" height="{height}"><style>text{{font-family:system-ui,'
+        'sans-serif}</style><rect width="100%" height="100%" fill="#fff"/>'
+        f"{rest}\n"
     )
 
 

@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""`bentwing evaluate`: the evidence about a trajectory and a map."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path  # noqa: TC003 - typer reads the annotations
+from typing import Annotated
+
+import typer
+
+
+def evaluate_command(
+    run: Annotated[
+        Path, typer.Argument(help="Run folder, or a TUM trajectory or a cloud of any program.")
+    ],
+    *,
+    reference_trajectory: Annotated[
+        Path | None, typer.Option(help="Lines `t x y z` or `t x y z qx qy qz qw` (TUM, CSV).")
+    ] = None,
+    reference_map: Annotated[
+        Path | None, typer.Option(help="Cloud (laz, las, ply, pcd, e57) or PLY mesh.")
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("-o", "--out", help="Folder to write into.", show_default="RUN/evaluation"),
+    ] = None,
+    clock_offset: Annotated[
+        float | None,
+        typer.Option(
+            help="Seconds by which the clock of the reference is ahead.", show_default="estimated"
+        ),
+    ] = None,
+    lever_arm: Annotated[
+        str | None,
+        typer.Option(
+            help="Tracked point in the IMU frame, x,y,z in metres.",
+            show_default="estimated for positions, 0,0,0 for poses",
+        ),
+    ] = None,
+    changed_beyond: Annotated[
+        float, typer.Option(help="Metres from the reference map beyond which things have changed.")
+    ] = 0.3,
+    quiet: Annotated[bool, typer.Option("--quiet", help="Say nothing but errors.")] = False,
+) -> None:
+    """Measure the errors of a trajectory and a map: evaluation.json, figures and a table."""
+    # slow to import, so only when it is needed
+    from rich.console import Console
+
+    from bentwing.cli.evaluation_table import tables
+    from bentwing.errors import UsageError
+    from bentwing.evaluate.evaluation import Question, evaluate
+    from bentwing.evaluate.folder import EvaluationFolder
+    from bentwing.evaluate.subject import find_subject
+    from bentwing.progress import create_progress
+    from bentwing.report import draw_evaluation
+
+    subject = find_subject(run)
+    if out is None and run.is_file():
+        msg = f"{run} is a file: give a folder for the results with -o OUT"
+        raise UsageError(msg)
+    if not 0 < changed_beyond < math.inf:
+        msg = f"--changed-beyond {changed_beyond} cannot be used; give a length in metres above 0"
+        raise UsageError(msg)
+    arm = None if lever_arm is None else _arm(lever_arm)
+    question = Question(reference_trajectory, reference_map, clock_offset, arm, changed_beyond)
+    folder = EvaluationFolder(run / "evaluation" if out is None else out)
+    progress = create_progress(quiet=quiet)
+    result = evaluate(subject, question, progress)
+    with progress.stage("drawing"):
+        draw_evaluation(folder, result)
+    references = [path for path in (reference_trajectory, reference_map) if path is not None]
+    folder.finish(result, question, [*subject.files(), *references])
+    if quiet:
+        return
+    console = Console()
+    for part in tables(result):
+        console.print(part)
+    typer.echo(f"{folder.path}: evaluation.json and figures")
+
+
+def _arm(given: str) -> tuple[float, float, float]:
+    from bentwing.errors import UsageError
+
+    try:
+        x, y, z = (float(value) for value in given.split(","))
+    except ValueError:
+        x = y = z = math.nan
+    if not all(map(math.isfinite, (x, y, z))):
+        msg = (
+            f"--lever-arm {given!r} is no point; give three numbers in metres, such as 0.1,0,-0.05"
+        )
+        raise UsageError(msg)
+    return x, y, z

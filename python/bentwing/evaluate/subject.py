@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""What is evaluated: a run folder, or a trajectory or a cloud of any program."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from bentwing.errors import UsageError
+from bentwing.map.read import MAP_SUFFIXES
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+@dataclass(frozen=True, slots=True)
+class Subject:
+    """Files of one run; None where there is no such file.
+
+    Attributes
+    ----------
+    trajectory, odometry : TUM, closed-loop and open-loop
+    map_path : a cloud
+    """
+
+    trajectory: Path | None
+    odometry: Path | None
+    map_path: Path | None
+
+    def files(self) -> list[Path]:
+        """Return those that exist."""
+        return [path for path in (self.trajectory, self.odometry, self.map_path) if path]
+
+
+def find_subject(path: Path) -> Subject:
+    """Find trajectory.txt, odometry.txt and map.* in a folder, or take a single file.
+
+    Raises
+    ------
+    UsageError
+        If there is none of them.
+    """
+    if path.is_file():
+        is_map = path.suffix.lower() in MAP_SUFFIXES
+        return Subject(None if is_map else path, None, path if is_map else None)
+    maps = [path / f"map{suffix}" for suffix in MAP_SUFFIXES]
+    poses = [path / "trajectory.txt", path / "odometry.txt"]
+    trajectory, odometry = (file if file.is_file() else None for file in poses)
+    found = Subject(trajectory, odometry, next((file for file in maps if file.is_file()), None))
+    if not found.files():
+        what = "has neither trajectory.txt nor map.laz" if path.is_dir() else "does not exist"
+        msg = (
+            f"{path}: {what}; give the folder of a run, a TUM trajectory, or a cloud "
+            f"({', '.join(MAP_SUFFIXES)})"
+        )
+        raise UsageError(msg)
+    return found

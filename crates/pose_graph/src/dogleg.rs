@@ -169,7 +169,9 @@ impl Legs {
         let mut descent: Vec<f64> = gradient.iter().zip(&scale).map(|(g, s)| -g / s).collect();
         let slope: f64 = gradient.iter().zip(&descent).map(|(g, d)| g * d).sum();
         let best = -slope / equations.matrix.quadratic(&descent).max(f64::MIN_POSITIVE);
-        descent.iter_mut().for_each(|d| *d *= best);
+        for d in &mut descent {
+            *d *= best;
+        }
         let product: f64 = gradient.iter().zip(&full).map(|(g, f)| g * f).sum();
         let full_length = length(&full, &scale);
         Self {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Which links are false: graduated non-convexity (Yang, Antonante, Tzoumas and Carlone 2020) with
-//! the kernel of Geman and McClure.
+//! the `Geman`–`McClure` kernel.
 //!
 //! The kernel's cost has many minima; so it is approached from a convex one, by a width that falls to
 //! its last. Informations are seldom right to a factor, and residuals of true links grow while

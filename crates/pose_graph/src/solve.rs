@@ -149,7 +149,7 @@ mod tests {
             let wave = |i: usize| 0.005 * ((3 * k + i) as f64 * 1.7).sin();
             let turn = so3::exp(&Vector3::new(wave(0), wave(1), wave(2)));
             let shift = Vector3::new(wave(3), wave(4), wave(5)) * 4.0;
-            link.T_from_to = link.T_from_to * Isometry3::from_parts(shift.into(), turn);
+            link.T_from_to *= Isometry3::from_parts(shift.into(), turn);
         }
         graph.poses = drifted(&graph, &Vector3::new(0.002, 0.001, 0.02));
         (truth, graph)
@@ -224,7 +224,9 @@ mod tests {
             so3::exp(&Vector3::new(0.2, 0.0, 0.0)),
         );
         graph.fixed.fill(false);
-        graph.poses.iter_mut().for_each(|pose| *pose = tilt * *pose);
+        for pose in &mut graph.poses {
+            *pose = tilt * *pose;
+        }
         graph.links.push(Link {
             from: None,
             to: 0,

@@ -245,7 +245,7 @@ fn same_length(name: &str, n: usize, expected: usize) -> PyResult<()> {
 }
 
 fn index(name: &str, row: usize, node: i64) -> PyResult<usize> {
-    usize::try_from(node).map_err(|_| {
+    usize::try_from(node).ok().ok_or_else(|| {
         PyValueError::new_err(format!("{name}: row {row} names node {node}, below zero"))
     })
 }

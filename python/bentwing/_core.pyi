@@ -16,12 +16,15 @@ from numpy.typing import NDArray
 
 from bentwing.estimators.core_settings import CoreSettings
 from bentwing.estimators.settings import SurfelSettings
+from bentwing.pose_graph.graph import GravityTerms, Links
+from bentwing.pose_graph.solve import SolveSettings
 
 __all__ = [
     "FixedView",
     "Globals",
     "Imu",
     "LazCompressor",
+    "PoseGraphSolution",
     "Registration",
     "Samples",
     "Scene",
@@ -29,6 +32,7 @@ __all__ = [
     "__version__",
     "extract_surfels",
     "register_window",
+    "solve_pose_graph",
 ]
 
 __version__: str
@@ -421,4 +425,62 @@ def register_window(
     References
     ----------
     Kaul 2015, section 2.1
+    """
+
+@final
+class PoseGraphSolution:
+    """The best poses of a graph."""
+
+    @property
+    def positions(self) -> NDArray[np.float64]:
+        """Positions (N, 3), m, map frame."""
+
+    @property
+    def quats_xyzw(self) -> NDArray[np.float64]:
+        """Rotations (N, 4)."""
+
+    @property
+    def weights(self) -> NDArray[np.float64]:
+        """Weight (L,) of each link: 1 believed, 0 rejected."""
+
+    @property
+    def chi2(self) -> NDArray[np.float64]:
+        """Squared residual (L,) of each link in units of its variance."""
+
+    @property
+    def cost(self) -> float:
+        """Half the sum of the weighted squared residuals of links and gravity."""
+
+    @property
+    def initial_cost(self) -> float:
+        """The same at the given poses, with all links."""
+
+    @property
+    def n_iterations(self) -> int:
+        """Linearizations in all."""
+
+    @property
+    def converged(self) -> bool:
+        """Whether the last step promised too little to go on."""
+
+def solve_pose_graph(
+    positions: NDArray[np.float64],
+    quats_xyzw: NDArray[np.float64],
+    fixed: NDArray[np.bool_],
+    *,
+    links: Links,
+    gravity: GravityTerms,
+    settings: SolveSettings,
+) -> PoseGraphSolution:
+    """Find the poses that agree best with links and gravity, and the links that are false.
+
+    Parameters
+    ----------
+    positions : (N, 3) float64, m, map frame
+    quats_xyzw : (N, 4) float64, unit
+    fixed : (N,) bool, nodes that stay
+
+    Raises
+    ------
+    SingularSystemError, DivergedError
     """

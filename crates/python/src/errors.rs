@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The one place that releases the GIL, and the one that turns Rust errors into Python's.
 
+use bentwing_pose_graph::GraphError;
 use bentwing_registration::SolveError;
-use pyo3::exceptions::PyRuntimeError;
+use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::marker::Ungil;
 use pyo3::prelude::*;
 
@@ -35,8 +36,23 @@ pub(crate) fn solve_error(py: Python<'_>, error: &SolveError) -> PyErr {
         SolveError::NotFinite => "DivergedError",
         _ => "EstimationError",
     };
+    raised(py, name, error.to_string())
+}
+
+/// The Python exception for a pose graph without solution.
+pub(crate) fn graph_error(py: Python<'_>, error: &GraphError) -> PyErr {
+    let name = match error {
+        GraphError::Loose { .. } | GraphError::Singular { .. } => "SingularSystemError",
+        GraphError::NotFinite => "DivergedError",
+        GraphError::Factorization(_) => "EstimationError",
+        _ => return PyValueError::new_err(error.to_string()),
+    };
+    raised(py, name, error.to_string())
+}
+
+fn raised(py: Python<'_>, name: &str, message: String) -> PyErr {
     let class = py.import("bentwing.errors").and_then(|m| m.getattr(name));
-    match class.and_then(|c| c.call1((error.to_string(),))) {
+    match class.and_then(|c| c.call1((message,))) {
         Ok(exception) => PyErr::from_value(exception),
         Err(failed) => failed,
     }

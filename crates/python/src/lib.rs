@@ -11,6 +11,7 @@ use pyo3::prelude::*;
 mod arrays;
 mod errors;
 mod laz;
+mod pose_graph;
 mod raycast;
 mod registration;
 mod trajectory;
@@ -22,6 +23,8 @@ mod _core {
 
     #[pymodule_export]
     use crate::laz::LazCompressor;
+    #[pymodule_export]
+    use crate::pose_graph::{PoseGraphSolution, solve_pose_graph};
     #[pymodule_export]
     use crate::raycast::Scene;
     #[pymodule_export]

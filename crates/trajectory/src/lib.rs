@@ -7,6 +7,7 @@ mod head;
 mod imu;
 mod propagation;
 mod samples;
+pub mod se3;
 pub mod so3;
 
 pub use correction_spline::{Basis, CorrectionSpline, StencilWeights};

@@ -40,14 +40,17 @@ pub fn log(q: &UnitQuaternion<f64>) -> Vector3<f64> {
 
 /// Inverse of the right Jacobian: `log(exp(phi) · exp(δ)) ≈ phi + right_jacobian_inverse(phi) δ`.
 pub fn right_jacobian_inverse(phi: &Vector3<f64>) -> Matrix3<f64> {
-    let angle = phi.norm();
     let h = hat(phi);
-    let c = if angle < 1e-3 {
+    Matrix3::identity() + 0.5 * h + log_coefficient(phi.norm()) * h * h
+}
+
+/// `(1 − ½θ cot ½θ)/θ²`, the factor of `φ×(φ×·)` in the inverses of the group's Jacobians.
+pub(crate) fn log_coefficient(angle: f64) -> f64 {
+    if angle < 1e-3 {
         1.0 / 12.0 + angle * angle / 720.0
     } else {
         1.0 / (angle * angle) - (1.0 + angle.cos()) / (2.0 * angle * angle.sin())
-    };
-    Matrix3::identity() + 0.5 * h + c * h * h
+    }
 }
 
 /// Two unit vectors that complete the unit vector `axis` to a right-handed frame.

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+#![doc = include_str!("../README.md")]
+#![forbid(unsafe_code)]
+
+mod blocks;
+mod cholesky;
+mod chordal;
+mod dogleg;
+mod equations;
+mod error;
+mod graph;
+mod poses;
+mod robust;
+mod solve;
+mod terms;
+#[cfg(test)]
+mod testing;
+
+pub use error::GraphError;
+pub use graph::{GravityTerm, Link, PoseGraph};
+pub use robust::Robust;
+pub use solve::{Settings, Solution, solve};

@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Which links are false: graduated non-convexity (Yang, Antonante, Tzoumas and Carlone 2020) with
+//! the `Geman`–`McClure` kernel.
+//!
+//! The kernel's cost has many minima; so it is approached from a convex one, by a width that falls to
+//! its last. Informations are seldom right to a factor, and residuals of true links grow while
+//! false ones pull; so they are measured by their median, not by what they should be. Up to half
+//! of the doubtful links may therefore be false.
+
+use nalgebra::Isometry3;
+
+use crate::GraphError;
+use crate::dogleg::{Minimizer, Minimum, Stop};
+use crate::equations::chi2s;
+use crate::graph::PoseGraph;
+
+/// How false links are told.
+#[derive(Clone, Copy, Debug)]
+pub struct Robust {
+    /// `rᵀΩr` in medians at which the kernel has lost three quarters of its weight.
+    pub kernel_width: f64,
+    /// `rᵀΩr` in medians above which a link is false in the end.
+    pub max_ratio: f64,
+    /// Factor by which the kernel narrows from step to step.
+    pub growth: f64,
+}
+
+/// Steps with the kernel at its final width at most.
+const MAX_FINAL_STEPS: usize = 10;
+
+/// `rᵀΩr` of links that agree to a millionth of a standard deviation; less is rounding.
+const EXACT: f64 = 1e-12;
+
+/// Change of the cost, as a share, at which the kernel at its final width has done its work.
+const SETTLED: f64 = 1e-2;
+
+/// How well the minimum for each width of the kernel is found; the next one will be another.
+const ROUGHLY: Stop = Stop {
+    max_iterations: 3,
+    min_relative_decrease: 0.03,
+};
+
+/// Finds which links are true; gives the poses reached and weights of 0 or 1.
+///
+/// `start` gives poses for weights that may be better than those given to it. False links fold a
+/// graph into poses from which no descent leads back, but the relaxation does not know of folds.
+///
+/// # Errors
+/// As the minimization.
+pub fn anneal(
+    graph: &PoseGraph,
+    minimizer: &mut Minimizer,
+    mut start: impl FnMut(&[Isometry3<f64>], &[f64]) -> Result<Vec<Isometry3<f64>>, GraphError>,
+    robust: &Robust,
+) -> Result<(Minimum, Vec<f64>), GraphError> {
+    let mut step = |poses: &[Isometry3<f64>], weights: &[f64]| {
+        minimizer.minimize(start(poses, weights)?, weights, ROUGHLY)
+    };
+    let mut best = step(&graph.poses, &vec![1.0; graph.links.len()])?;
+    let mut residuals = Residuals::at(graph, &best);
+    // Convex from here on (Yang 2020, remark 5).
+    let mut width = 2.0 * residuals.worst;
+    let mut n_final_steps = 0;
+    while n_final_steps < MAX_FINAL_STEPS {
+        let weights = residuals.weights(graph, |chi2| (width / (chi2 + width)).powi(2));
+        let moved = step(&best.poses, &weights)?;
+        let settled = (best.cost - moved.cost).abs() < SETTLED * best.cost;
+        best = Minimum {
+            n_iterations: best.n_iterations + moved.n_iterations,
+            ..moved
+        };
+        residuals = Residuals::at(graph, &best);
+        // The median falls faster than the kernel may narrow, once the fold is undone.
+        let narrowest = robust.kernel_width * residuals.median;
+        if width <= narrowest {
+            n_final_steps += 1;
+            if settled {
+                break;
+            }
+        }
+        width = (width / robust.growth).max(narrowest);
+    }
+    let limit = robust.max_ratio * residuals.median;
+    let weights = residuals.weights(graph, |chi2| f64::from(u8::from(chi2 <= limit)));
+    Ok((best, weights))
+}
+
+/// `rᵀΩr` of all links, and of the doubtful ones the median and the largest.
+struct Residuals {
+    chi2: Vec<f64>,
+    median: f64,
+    worst: f64,
+}
+
+impl Residuals {
+    fn at(graph: &PoseGraph, minimum: &Minimum) -> Self {
+        let chi2 = chi2s(graph, &minimum.poses);
+        let doubtful = graph.links.iter().zip(&chi2).filter(|(l, _)| !l.trusted);
+        let mut sorted: Vec<f64> = doubtful.map(|(_, c)| *c).collect();
+        sorted.sort_unstable_by(f64::total_cmp);
+        Self {
+            chi2,
+            median: sorted.get(sorted.len() / 2).map_or(EXACT, |m| m.max(EXACT)),
+            worst: sorted.last().copied().unwrap_or(0.0),
+        }
+    }
+
+    fn weights(&self, graph: &PoseGraph, kernel: impl Fn(f64) -> f64) -> Vec<f64> {
+        let weight =
+            |(link, chi2): (&crate::Link, &f64)| if link.trusted { 1.0 } else { kernel(*chi2) };
+        graph.links.iter().zip(&self.chi2).map(weight).collect()
+    }
+}

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The one place that releases the GIL, and the one that turns Rust errors into Python's.
 
+use bentwing_ndt::NdtError;
 use bentwing_registration::SolveError;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::marker::Ungil;
@@ -35,8 +36,24 @@ pub(crate) fn solve_error(py: Python<'_>, error: &SolveError) -> PyErr {
         SolveError::NotFinite => "DivergedError",
         _ => "EstimationError",
     };
+    raised(py, name, &error.to_string())
+}
+
+/// The Python exception for a scan without a pose.
+pub(crate) fn ndt_error(py: Python<'_>, error: &NdtError) -> PyErr {
+    let name = match error {
+        NdtError::TooFewMatches { .. } => "NotEnoughDataError",
+        NdtError::Singular { .. } => "SingularSystemError",
+        NdtError::NotFinite => "DivergedError",
+        _ => "EstimationError",
+    };
+    raised(py, name, &error.to_string())
+}
+
+/// An exception of `bentwing.errors`.
+fn raised(py: Python<'_>, name: &str, message: &str) -> PyErr {
     let class = py.import("bentwing.errors").and_then(|m| m.getattr(name));
-    match class.and_then(|c| c.call1((error.to_string(),))) {
+    match class.and_then(|c| c.call1((message,))) {
         Ok(exception) => PyErr::from_value(exception),
         Err(failed) => failed,
     }

@@ -10,6 +10,7 @@ use pyo3::prelude::*;
 
 mod arrays;
 mod errors;
+mod ndt;
 mod raycast;
 mod registration;
 mod trajectory;
@@ -19,6 +20,8 @@ mod trajectory;
 mod _core {
     use pyo3::prelude::*;
 
+    #[pymodule_export]
+    use crate::ndt::{NdtReference, NdtRegistration, thin_points};
     #[pymodule_export]
     use crate::raycast::Scene;
     #[pymodule_export]

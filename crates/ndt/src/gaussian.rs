@@ -8,11 +8,10 @@ use nalgebra::{Matrix3, Vector3};
 /// A voxel with fewer points says nothing.
 const MIN_POINTS: u32 = 6;
 /// The middle standard deviation, in voxels, below which the points are one scan line: the surface
-/// is then free to turn about it.
-const MIN_WIDTH: f64 = 0.05;
-/// Variance, in squared voxels, of a surface that the voxel cuts off. Points spread evenly over an
-/// edge have 1/12; scan lines leave gaps, so that less is already no shape of the surface.
-const CUT_VARIANCE: f64 = 0.02;
+/// is then free to turn about it. Along a surface points end where the voxel does or where the scan
+/// lines lay, and an edge of the voxel filled evenly has 0.29; so whatever is wider than this is no
+/// shape of the surface.
+const MIN_WIDTH: f64 = 0.07;
 
 /// What regularizes the distributions.
 #[derive(Clone, Copy, Debug)]
@@ -36,9 +35,8 @@ pub(crate) struct Gaussian {
 impl Gaussian {
     /// Distribution of the points in a voxel of edge `size` around `middle`, if they show a surface.
     ///
-    /// Along the surface the points end where the voxel does or where the scan lines lay. The
-    /// inverse of the covariance would pull scans there and so towards not having moved; what a
-    /// surface cut off by the voxel would have is therefore taken off.
+    /// The inverse of the covariance would pull scans along the surface too, to where the keyframe's
+    /// lines lay and so towards not having moved; what a wide distribution has is therefore taken off.
     pub(crate) fn of(
         moments: &Moments,
         middle: &Vector3<f64>,
@@ -50,11 +48,12 @@ impl Gaussian {
         }
         let covariance = moments.covariance();
         let (values, axes) = eigen(&covariance);
-        if values[1] < (MIN_WIDTH * size).powi(2) {
+        let wide = (MIN_WIDTH * size).powi(2);
+        if values[1] < wide {
             return None;
         }
         let floor = shape.sigma.max(shape.roughness * size).powi(2);
-        let cut = 1.0 / (CUT_VARIANCE * size * size);
+        let cut = 1.0 / wide;
         let gains = values.map(|v| (1.0 / v.max(floor) - cut).max(0.0));
         if gains[0] <= 0.0 {
             return None;
@@ -123,9 +122,10 @@ mod tests {
             prop_assert!(found.is_some());
             if let Some(g) = found {
                 let n = R * Vector3::z();
-                let expected = n * n.transpose() * (2500.0 - 50.0);
+                let expected_gain = 2500.0 - (MIN_WIDTH * 1.0).powi(-2);
+                let expected = n * n.transpose() * expected_gain;
                 prop_assert!((g.information - expected).norm() < 1e-6 * expected.norm());
-                prop_assert!((g.sharpest - 2450.0).abs() < 1e-6);
+                prop_assert!((g.sharpest - expected_gain).abs() < 1e-6);
                 prop_assert!((g.mean - middle).norm() < 1e-12);
             }
         }

@@ -13,7 +13,7 @@ const FIRST_REACH: f64 = 4.0;
 /// Most evaluations of the score on one level.
 const MAX_EVALUATIONS: usize = 12;
 /// A step shorter than this, rad and m, is the last one: of the finest level, and of the others.
-const LAST_STEP: (f64, f64) = (2e-6, 1e-4);
+const LAST_STEP: (f64, f64) = (2e-5, 1e-3);
 const COARSE_STEP: (f64, f64) = (2e-4, 1e-2);
 /// Damping of the first step that fails, its growth with each further one, and its largest value.
 const DAMPING: (f64, f64, f64) = (1e-3, 10.0, 1e3);

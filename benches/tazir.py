@@ -19,13 +19,13 @@ import numpy as np
 from cost import python
 from scoring import best_points, in_flight, mapped_points, read_scene
 
+from bentwing.estimators.mount import described_mount
+from bentwing.estimators.ndt.outcome import calibration_of
 from bentwing.evaluate.density import wall_density
 from bentwing.evaluate.map import surface_error
 from bentwing.evaluate.poses import pose_errors
 from bentwing.evaluate.trajectory import absolute_error
 from bentwing.map.project import project
-from bentwing.estimators.mount import described_mount
-from bentwing.estimators.ndt.outcome import calibration_of
 from bentwing.preprocess import preprocess
 from bentwing.recording import Payload, Recording
 from bentwing.trajectory import read_tum
@@ -63,9 +63,9 @@ WALLS = (
 
 
 def bentwing(*arguments: str | Path) -> float | None:
-    """Run a command; return its seconds of wall time, or None where it failed."""
+    """Run a command; return its seconds, or None where it failed."""
     finished = python("-c", "from bentwing.cli.main import run; run()", *arguments)
-    return None if finished.code else finished.cost.wall
+    return None if finished.code else finished.cost.seconds
 
 
 def simulated(flight: Flight, seed: int, folder: Path) -> Path:
@@ -104,7 +104,7 @@ def measured(flight: Flight, estimator: str, recording: Path, out: Path) -> dict
     }
 
 
-def _map_ratio(recording, out, truth, origin_ns, alignment) -> float | None:  # noqa: ANN001
+def _map_ratio(recording, out, truth, origin_ns, alignment) -> float | None:
     """Thickness of the map across the true surfaces, over that of the map from the true poses."""
     flown = in_flight(truth)
     scene = read_scene(recording / "truth_scene.ply")
@@ -141,10 +141,10 @@ def densities(flight: Flight, folder: Path) -> str:
     points = np.concatenate([chunk.points for chunk in chunks])
     cells = [flight.name]
     for axis in (0, 1):
-        density = wall_density(points, axis, 10.0, ((-8.0, 8.0), (0.5, 9.5)), 1.0)
+        density = wall_density(points, axis, 10.0, limits=((-8.0, 8.0), (0.5, 9.5)), cell=1.0)
         middle, sides = density[6:10, 3:6], density[[0, 1, -2, -1]]
         cells += [f"{middle.mean():.0f}", f"{sides.mean():.0f}", f"{(density > 0).mean():.2f}"]
-    floor = wall_density(points, 2, 0.0, ((-9.0, 9.0), (-9.0, 9.0)), 1.0)
+    floor = wall_density(points, 2, 0.0, limits=((-9.0, 9.0), (-9.0, 9.0)), cell=1.0)
     return f"| {' | '.join([*cells, f'{(floor > 0).mean():.2f}'])} |"
 
 

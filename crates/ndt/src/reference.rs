@@ -48,13 +48,6 @@ impl Reference {
         (self.levels.par_iter_mut()).for_each(|level| level.insert(&placed, &shape));
     }
 
-    /// Forgets everything.
-    pub fn clear(&mut self) {
-        for level in &mut self.levels {
-            *level = Grid::new(level.size());
-        }
-    }
-
     /// Forgets what is farther than `radius`, m, from `centre`, map frame.
     pub fn keep_within(&mut self, centre: &Vector3<f64>, radius: f64) {
         (self.levels.par_iter_mut()).for_each(|level| level.keep_within(centre, radius));

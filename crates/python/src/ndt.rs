@@ -67,11 +67,6 @@ impl NdtReference {
         in_pool(py, threads, || reference.insert(points, &pose))
     }
 
-    /// Forgets everything.
-    fn clear(&mut self) {
-        self.0.clear();
-    }
-
     /// Forgets what is farther than `radius` from `centre`.
     #[pyo3(signature = (centre, radius, *, threads = 0))]
     fn keep_within(
@@ -172,14 +167,6 @@ impl NdtRegistration {
     #[getter]
     fn rotation_eigenvalues(&self) -> [f64; 3] {
         shares(&self.0.rotation)
-    }
-
-    /// Direction (3) in the map in which the scan says least about its translation.
-    #[getter]
-    fn weakest_direction(&self) -> [f64; 3] {
-        bentwing_surfels::sym3::eigen(&self.0.translation)
-            .normal
-            .into()
     }
 
     /// Evaluations of the score.

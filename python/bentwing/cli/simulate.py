@@ -28,7 +28,10 @@ def simulate_command(  # noqa: PLR0917 - one parameter per option
     out: Annotated[Path, Option("--output", "-o", help="Folder to write into.")],
     head: Annotated[
         str | None,
-        Option(help=f"One of {_names(HeadName)}.", show_default="hokuyo-spin; town, walls, dam: vlp16-motor"),
+        Option(
+            help=f"One of {_names(HeadName)}.",
+            show_default="hokuyo-spin; town, walls, dam: vlp16-motor",
+        ),
     ] = None,
     duration: Annotated[float, Option(help="Length of the recording, s.")] = 60.0,
     seed: Annotated[int, Option(help="Varies geometry, motion, calibration and noise.")] = 0,
@@ -43,12 +46,13 @@ def simulate_command(  # noqa: PLR0917 - one parameter per option
         str | None,
         Option(help=f"One of {_names(FlightName)}.", show_default="survey where there is no tour"),
     ] = None,
-    calibrated: Annotated[
-        bool, Option("--calibrated", help="The payload is exact, the clocks agree.")
-    ] = False,
     event: Annotated[
         list[str] | None, Option(help=f"Repeatable: {_names(EventName)}.", show_default=False)
     ] = None,
+    *,
+    calibrated: Annotated[
+        bool, Option("--calibrated", help="The payload is exact, the clocks agree.")
+    ] = False,
 ) -> None:
     """Simulate a recording with truth: bag, payload.yaml, trajectory, scene and calibration."""
     choices: dict[str, object] = {

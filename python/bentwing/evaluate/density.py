@@ -15,6 +15,7 @@ def wall_density(
     points: NDArray[np.float64],
     axis: int,
     at: float,
+    *,
     limits: tuple[tuple[float, float], tuple[float, float]],
     cell: float,
     thickness: float = 0.2,

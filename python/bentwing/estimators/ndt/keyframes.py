@@ -32,25 +32,19 @@ class Keyframes:
     threads : 0 is one per core
     """
 
-    def __init__(
-        self, settings: NdtSettings, max_range: float, sigma: float, threads: int
-    ) -> None:
+    def __init__(self, settings: NdtSettings, max_range: float, sigma: float, threads: int) -> None:
         self._settings = settings
         self._max_range = max_range
+        self._sigma = sigma
         self._threads = threads
-        self.reference = _core.NdtReference(
-            voxel_size=settings.voxel_size,
-            n_levels=settings.n_levels,
-            sigma=sigma,
-            roughness=ROUGHNESS,
-        )
+        self.reference = self._nothing()
         self.n_keyframes = 0
         self._last: Placed | None = None
         self._swept: Placed | None = None
 
     def clear(self) -> None:
         """Forget all of them."""
-        self.reference.clear()
+        self.reference = self._nothing()
         self._last = self._swept = None
 
     def wants(self, lidar: Placed) -> bool:
@@ -76,11 +70,19 @@ class Keyframes:
         pose, lidar : of the IMU and of the lidar in the map
         """
         if self._settings.reference == "last":
-            self.reference.clear()
+            self.reference = self._nothing()
         self.reference.insert(points, _pair(pose), threads=self._threads)
         self.n_keyframes += 1
         self._last = lidar
         self._sweep(lidar)
+
+    def _nothing(self) -> _core.NdtReference:
+        return _core.NdtReference(
+            voxel_size=self._settings.voxel_size,
+            n_levels=self._settings.n_levels,
+            sigma=self._sigma,
+            roughness=ROUGHNESS,
+        )
 
     def _sweep(self, lidar: Placed) -> None:
         if self._swept is None:

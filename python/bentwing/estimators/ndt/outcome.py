@@ -40,7 +40,10 @@ def levelled_trajectory(
     starts = [span[0], *(t.poses[0].time for t in tracks[1:])]
     stops = [*(t.last.time for t in tracks[:-1]), span[1]]
     parts = [t.trajectory(a, b) for t, a, b in zip(tracks, starts, stops, strict=True)]
-    parts = [*(_until(p, start) for p, start in zip(parts[:-1], starts[1:], strict=True)), parts[-1]]
+    parts = [
+        *(_until(p, start) for p, start in zip(parts[:-1], starts[1:], strict=True)),
+        parts[-1],
+    ]
     turn, origin = levelling.turn(parts[0]), parts[0].positions[0]
     level = [
         Trajectory(
@@ -60,7 +63,11 @@ def record_of(time: float, n_surfaces: int, match: Match | None) -> dict[str, An
     `registration_rmse` is the root mean square distance from the surfaces of the reference, m
     (Tazir 2020, figure 13).
     """
-    record: dict[str, Any] = {"time": time, "n_surfels": n_surfaces, "registered": match is not None}
+    record: dict[str, Any] = {
+        "time": time,
+        "n_surfels": n_surfaces,
+        "registered": match is not None,
+    }
     if match is None:
         return record | {
             "n_points": 0, "n_matches": 0, "inlier_share": None, "residual_rms": None,
@@ -79,7 +86,6 @@ def record_of(time: float, n_surfaces: int, match: Match | None) -> dict[str, An
         "degenerate": min(shift[0], turn[0]) < LEAST_SHARE,
         "translation_eigenvalues": shift,
         "rotation_eigenvalues": turn,
-        "weakest_direction": found.weakest_direction,
     }
 
 

@@ -133,12 +133,18 @@ mod tests {
 
     #[test]
     fn a_scan_line_few_points_and_a_full_voxel_say_nothing() {
-        let line = (0..40).map(|i| Vector3::new(f64::from(i) * 0.02, 0.001 * f64::from(i % 3), 0.0));
+        let line =
+            (0..40).map(|i| Vector3::new(f64::from(i) * 0.02, 0.001 * f64::from(i % 3), 0.0));
         let few = (0..5).map(|i| Vector3::new(f64::from(i % 2), f64::from(i / 2), 0.0));
         let full = (0..1000).map(|i| {
-            Vector3::new(f64::from(i % 10), f64::from(i / 10 % 10), f64::from(i / 100)) * 0.1
+            Vector3::new(
+                f64::from(i % 10),
+                f64::from(i / 10 % 10),
+                f64::from(i / 100),
+            ) * 0.1
         });
-        let of = |m: Option<Moments>| m.and_then(|m| Gaussian::of(&m, &Vector3::zeros(), 1.0, &SHAPE));
+        let of =
+            |m: Option<Moments>| m.and_then(|m| Gaussian::of(&m, &Vector3::zeros(), 1.0, &SHAPE));
         assert!(of(moments(line)).is_none());
         assert!(of(moments(few)).is_none());
         assert!(of(moments(full)).is_none());

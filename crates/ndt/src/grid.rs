@@ -90,8 +90,7 @@ impl Grid {
             let cell = &cells[*i as usize];
             Gaussian::of(&cell.moments(), &cell.middle, self.size, shape)
         };
-        let made: Vec<Option<Gaussian>> =
-            touched.par_iter().with_min_len(CHUNK).map(of).collect();
+        let made: Vec<Option<Gaussian>> = touched.par_iter().with_min_len(CHUNK).map(of).collect();
         for (i, gaussian) in touched.iter().zip(made) {
             self.gaussians[*i as usize] = gaussian;
         }

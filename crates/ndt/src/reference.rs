@@ -57,6 +57,8 @@ impl Reference {
     #[inline]
     pub(crate) fn at(&self, p: &[f64; 3], finest: usize) -> Option<(usize, &Gaussian)> {
         let levels = self.levels.iter().enumerate().skip(finest);
-        levels.into_iter().find_map(|(l, grid)| grid.at(p).map(|g| (l, g)))
+        levels
+            .into_iter()
+            .find_map(|(l, grid)| grid.at(p).map(|g| (l, g)))
     }
 }

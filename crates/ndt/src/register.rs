@@ -23,7 +23,9 @@ const DAMPING: (f64, f64, f64) = (1e-3, 10.0, 1e3);
 #[non_exhaustive]
 pub enum NdtError {
     /// The reference and the scan have too little in common.
-    #[error("{matched} of {points} points lie where the keyframes saw a surface, fewer than {least}")]
+    #[error(
+        "{matched} of {points} points lie where the keyframes saw a surface, fewer than {least}"
+    )]
     TooFewMatches {
         /// Points in voxels with a distribution.
         matched: usize,

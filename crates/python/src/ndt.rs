@@ -15,7 +15,10 @@ type Transform = ([f64; 3], [f64; 4]);
 
 fn isometry(name: &str, (t, q): &Transform) -> PyResult<Isometry3<f64>> {
     let translation = Translation3::from(finite_vector(name, *t)?);
-    Ok(Isometry3::from_parts(translation, unit_quaternion(name, q)?))
+    Ok(Isometry3::from_parts(
+        translation,
+        unit_quaternion(name, q)?,
+    ))
 }
 
 fn positive(name: &str, value: f64) -> PyResult<f64> {
@@ -76,7 +79,10 @@ impl NdtReference {
         radius: f64,
         threads: usize,
     ) -> PyResult<()> {
-        let (centre, radius) = (finite_vector("centre", centre)?, positive("radius", radius)?);
+        let (centre, radius) = (
+            finite_vector("centre", centre)?,
+            positive("radius", radius)?,
+        );
         let reference = &mut self.0;
         in_pool(py, threads, || reference.keep_within(&centre, radius))
     }

@@ -12,7 +12,10 @@ use crate::register::moved;
 /// Three walls of a room, and its points in the map.
 pub(crate) fn room() -> (Reference, Vec<[f64; 3]>) {
     let on_walls = |i: usize| {
-        let (a, b) = ((i % 67) as f64 * 0.15 + 0.04, (i / 67 % 67) as f64 * 0.15 + 0.03);
+        let (a, b) = (
+            (i % 67) as f64 * 0.15 + 0.04,
+            (i / 67 % 67) as f64 * 0.15 + 0.03,
+        );
         match i % 3 {
             0 => [a, b, 0.013 * ((i % 7) as f64 - 3.0) + 0.5],
             1 => [a, 0.5 + 0.011 * ((i % 5) as f64 - 2.0), b],
@@ -116,9 +119,15 @@ fn any_number_of_threads_gives_the_same_sums() -> Result<(), rayon::ThreadPoolBu
     let at = pose([0.01, 0.0, 0.02], [0.03, 0.0, 0.0]);
     let mut all = Vec::new();
     for threads in [1, 2, 4] {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()?;
         let sums = pool.install(|| score(&reference, &points, &at, &scale));
-        all.push((sums.cost.to_bits(), sums.gradient.map(f64::to_bits), sums.hessian.map(f64::to_bits)));
+        all.push((
+            sums.cost.to_bits(),
+            sums.gradient.map(f64::to_bits),
+            sums.hessian.map(f64::to_bits),
+        ));
     }
     assert_eq!(all[0], all[1]);
     assert_eq!(all[0], all[2]);

@@ -16,8 +16,8 @@ from bentwing.estimators.interface import Estimate
 from bentwing.estimators.mount import FixedMount, MotorMount, Pose, described_mount
 from bentwing.estimators.ndt.keyframes import Keyframes
 from bentwing.estimators.ndt.levelling import Levelling
-from bentwing.estimators.ndt.matching import Matcher
-from bentwing.estimators.ndt.motion import Placed, Track
+from bentwing.estimators.ndt.matching import Match, Matcher
+from bentwing.estimators.ndt.motion import REST, Placed, Track
 from bentwing.estimators.ndt.outcome import (
     calibration_of,
     levelled_trajectory,
@@ -37,6 +37,8 @@ if TYPE_CHECKING:
 MIN_POINTS = 200
 # Without a registered scan for longer than this the place is lost, s.
 LOST_AFTER = 1.0
+# Batches that end within this time before the last scan are held, s.
+HELD = 1.0
 # 2D scanners, which show single planes.
 PLANAR_KINDS = ("hokuyo-utm30lx",)
 
@@ -78,6 +80,8 @@ class Ndt:
         self._last = 0.0
         self._n_stretches = 0
         self._tracks: list[Track] = []
+        # The first scan of the newest track.
+        self._opening: Scan | None = None
         self._windows: list[dict[str, Any]] = []
         self._n_small = 0
         self._seconds = 0.0
@@ -149,7 +153,8 @@ class Ndt:
                 return
             self._n_stretches += 1
             self._take(start, stop)
-            self._buffer.forget(stop)
+            # What is held of the other sensor shows whether its times go back.
+            self._buffer.forget(stop - HELD)
 
     def _take(self, start: float, stop: float) -> None:
         """Register the scan of one stretch of time, if there is one."""
@@ -171,13 +176,14 @@ class Ndt:
         """Begin a track with a keyframe and nothing before it."""
         self._keyframes.clear()
         self._tracks.append(Track(pose))
-        points = self._matcher.placed(scan, None)
+        self._opening = scan
+        points = self._matcher.placed(scan, REST)
         self._keyframes.add(points, pose, self._lidar(scan, pose))
 
     def _follow(self, scan: Scan, stop: float) -> None:
         """Register a scan, and make it a keyframe if the lidar has moved."""
         track = self._tracks[-1]
-        match = self._matcher.match(scan, track, self._keyframes.reference)
+        match = self._match(scan, track)
         self._windows.append(record_of(stop, len(self._keyframes.reference), match))
         if match is None:
             if scan.time - track.last.time > LOST_AFTER:
@@ -189,6 +195,16 @@ class Ndt:
             began = time.perf_counter()
             self._keyframes.add(match.points, match.pose, lidar)
             self._seconds += time.perf_counter() - began
+
+    def _match(self, scan: Scan, track: Track) -> Match | None:
+        """Find the place of a scan; the second of a track also tells how the first one was bent."""
+        match = self._matcher.match(scan, track, self._keyframes.reference)
+        if match is None or len(track.poses) > 1 or self._opening is None:
+            return match
+        first, pose = self._opening, track.last
+        points = self._matcher.placed(first, track.twist_at(match.pose))
+        self._keyframes.renew(points, pose, self._lidar(first, pose))
+        return self._matcher.match(scan, track, self._keyframes.reference)
 
     def _lose(self, scan: Scan, track: Track) -> None:
         """Begin anew where the last motion leads."""

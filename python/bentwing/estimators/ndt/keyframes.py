@@ -47,6 +47,12 @@ class Keyframes:
         self.reference = self._nothing()
         self._last = self._swept = None
 
+    def renew(self, points: NDArray[np.float64], pose: Placed, lidar: Placed) -> None:
+        """Replace the only keyframe there is by a better one; as `add`."""
+        self.clear()
+        self.n_keyframes -= 1
+        self.add(points, pose, lidar)
+
     def wants(self, lidar: Placed) -> bool:
         """Whether the lidar has moved or turned enough since the last keyframe.
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from bentwing import _core
 from bentwing.errors import EstimationError
-from bentwing.estimators.ndt.motion import REST, Placed
+from bentwing.estimators.ndt.motion import Placed
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -68,19 +68,19 @@ class Matcher:
         self._threads = threads
         self.timings = {"place": 0.0, "register": 0.0}
 
-    def placed(self, scan: Scan, track: Track | None) -> NDArray[np.float64]:
-        """All points of a scan in the IMU frame at its time, by the motion of a track so far."""
-        return self._placed(scan, REST if track is None else track.twist())
+    def placed(self, scan: Scan, twist: Twist) -> NDArray[np.float64]:
+        """All points of a scan in the IMU frame at its time, if the twist holds all along."""
+        return self._timed("place", lambda: scan.placed(twist, self._head, self._threads))
 
     def match(self, scan: Scan, track: Track, reference: _core.NdtReference) -> Match | None:
         """Find the place of a scan near where the track leads; None if it fits nowhere there."""
-        points = self.placed(scan, track)
+        points = self.placed(scan, track.twist())
         chosen = _core.thin_points(points, spacing=SPACING, most=self._max_points)
         try:
             first = self._fit(reference, points[chosen], track.expected(scan.time), coarse=True)
             # Once more without the distortion by what of the motion was not expected.
             pose = _pose(scan, first)
-            points = self._placed(scan, track.twist_at(pose))
+            points = self.placed(scan, track.twist_at(pose))
             found = self._fit(reference, points[chosen], pose, coarse=False)
         except EstimationError:
             return None
@@ -88,9 +88,6 @@ class Matcher:
         if found.inlier_share < LEAST_INLIERS or found.n_matched < LEAST_MATCHES * n_points:
             return None
         return Match(_pose(scan, found), points, n_points, found)
-
-    def _placed(self, scan: Scan, twist: Twist) -> NDArray[np.float64]:
-        return self._timed("place", lambda: scan.placed(twist, self._head, self._threads))
 
     def _fit(
         self,

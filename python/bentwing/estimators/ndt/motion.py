@@ -149,7 +149,11 @@ def _slopes(shifts: Array, steps: Array) -> Array:
     rates = shifts / steps[:, None]
     share = (steps[:-1] / (steps[:-1] + steps[1:]))[:, None]
     middle = rates[:-1] + share * (rates[1:] - rates[:-1])
-    return np.concatenate([rates[:1], middle, rates[-1:]])
+    if not len(middle):
+        return np.concatenate([rates, rates])
+    # The parabola at the ends goes on from the middle of the outermost steps.
+    first, last = 2 * rates[:1] - middle[:1], 2 * rates[-1:] - middle[-1:]
+    return np.concatenate([first, middle, last])
 
 
 def _hermite(u: Array, end: Array, slope: Array, end_slope: Array) -> Array:

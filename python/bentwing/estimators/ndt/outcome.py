@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 # A scan is degenerate when it says so much less, as a share of all, about its translation or its
 # rotation in one direction: the surfaces it sees could be shifted or turned along themselves.
-LEAST_SHARE = 0.003
+LEAST_SHARE = 5e-4
 # More of the scans than this are worth a sentence.
 FEW = 0.02
 

@@ -116,12 +116,12 @@ class Track:
         the rate in the imu frame differ by less than the rate itself changes.
         """
         n = int(np.ceil((stop - start) / DT - 1e-6)) + 1
-        times = start + DT * np.arange(max(n, 2))
+        times: Array = start + DT * np.arange(float(max(n, 2)))
         if len(self.poses) == 1:
             return Trajectory(times, *_repeated(self.last, len(times)))
-        knots = np.array([p.time for p in self.poses])
-        p = np.array([p.translation for p in self.poses])
-        q = np.array([p.quat_xyzw for p in self.poses])
+        knots = np.array([pose.time for pose in self.poses])
+        p = np.array([pose.translation for pose in self.poses])
+        q = np.array([pose.quat_xyzw for pose in self.poses])
         steps = np.diff(knots)
         turns = geometry.log(geometry.multiply(geometry.inverse(q[:-1]), q[1:]))
         v, w = _slopes(np.diff(p, axis=0), steps), _slopes(turns, steps)

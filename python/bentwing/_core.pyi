@@ -24,6 +24,8 @@ __all__ = [
     "Globals",
     "Imu",
     "LazCompressor",
+    "NdtReference",
+    "NdtRegistration",
     "PoseGraphSolution",
     "Registration",
     "Samples",
@@ -33,6 +35,7 @@ __all__ = [
     "extract_surfels",
     "register_window",
     "solve_pose_graph",
+    "thin_points",
 ]
 
 __version__: str
@@ -483,4 +486,102 @@ def solve_pose_graph(
     Raises
     ------
     SingularSystemError, DivergedError
+    """
+
+@final
+class NdtReference:
+    """The surfaces that keyframes have seen, as normal distributions of voxels on several levels.
+
+    Parameters
+    ----------
+    voxel_size : m, of the finest level; each further level doubles
+    n_levels : 1 to 16
+    sigma : m, least standard deviation of a surface: the noise of a range
+    roughness : the same in voxels of each level (the eigenvalue floor)
+    """
+
+    def __new__(
+        cls, *, voxel_size: float, n_levels: int, sigma: float, roughness: float
+    ) -> NdtReference: ...
+    def __len__(self) -> int: ...
+    def insert(self, points: NDArray[np.float64], pose: _Transform, *, threads: int = 0) -> None:
+        """Add the points (N, 3), m, of a keyframe; `pose` is that of their frame in the map."""
+
+    def keep_within(self, centre: _Vector, radius: float, *, threads: int = 0) -> None:
+        """Forget what is farther than `radius`, m, from `centre` (3,), m, map frame."""
+
+    def register(
+        self,
+        points: NDArray[np.float64],
+        expected: _Transform,
+        *,
+        rotation_sigma: float,
+        translation_sigma: float,
+        independence: float,
+        coarse: bool = True,
+        threads: int = 0,
+    ) -> NdtRegistration:
+        """Find the pose at which a scan fits what the keyframes saw.
+
+        Parameters
+        ----------
+        points : (N, 3) float64, m, frame of the scan
+        expected : its pose in the map, from which the search begins
+        rotation_sigma, translation_sigma : rad and m, how well that is known
+        independence : information of a point relative to that of an independent one
+        coarse : whether to begin on the coarsest level, or to use the finest only
+
+        Raises
+        ------
+        NotEnoughDataError, SingularSystemError, DivergedError
+        """
+
+@final
+class NdtRegistration:
+    """Result of a registration to a reference."""
+
+    @property
+    def translation(self) -> NDArray[np.float64]:
+        """Position (3,) of the scan, m, map frame."""
+
+    @property
+    def quat_xyzw(self) -> NDArray[np.float64]:
+        """Rotation (4,) of the scan."""
+
+    @property
+    def n_matched(self) -> int:
+        """Points in voxels with a distribution."""
+
+    @property
+    def inlier_share(self) -> float:
+        """Share of the matched points within two standard deviations."""
+
+    @property
+    def residual_rms(self) -> float:
+        """Weighted root mean square of the distances in standard deviations."""
+
+    @property
+    def rmse(self) -> float:
+        """Weighted root mean square of the distances, m."""
+
+    @property
+    def translation_eigenvalues(self) -> list[float]:
+        """Eigenvalues (3) of the information about the translation, shares of their sum, increasing."""
+
+    @property
+    def rotation_eigenvalues(self) -> list[float]:
+        """Eigenvalues (3) of the information about the rotation, shares of their sum, increasing."""
+
+    @property
+    def n_iterations(self) -> int:
+        """Evaluations of the score."""
+
+    @property
+    def converged(self) -> bool:
+        """Whether the last step was short enough."""
+
+def thin_points(points: NDArray[np.float64], *, spacing: float, most: int) -> NDArray[np.uint64]:
+    """Choose the first of the points (N, 3), m, in each voxel of edge `spacing`, m.
+
+    Where they are more than `most`, evenly chosen ones of them; returns increasing row numbers.
     """

@@ -21,6 +21,11 @@ NUMBERS = [
 ]
 
 
+@pytest.fixture
+def head(heads):
+    return heads("continuous")
+
+
 @pytest.mark.parametrize("model", MODELS)
 def test_settings_cannot_be_changed(model):
     settings = model()

@@ -10,6 +10,8 @@ ROOT = Path(__file__).parents[2]
 SPDX = "SPDX-License-Identifier: MIT OR Apache-2.0"
 MAX_LINES = 500
 SUFFIXES = {".py", ".pyi", ".rs"}
+# One compiled module has one stub, however much it exposes.
+WHOLE = {"_core.pyi"}
 
 
 def sources(*folders: str) -> list[Path]:
@@ -41,7 +43,7 @@ def test_no_source_file_exceeds_500_lines() -> None:
     long = {
         str(path.relative_to(ROOT)): own_lines(path)
         for path in sources("python", "crates")
-        if not is_test(path) and own_lines(path) > MAX_LINES
+        if not is_test(path) and path.name not in WHOLE and own_lines(path) > MAX_LINES
     }
     assert not long, f"look for the seam: {long}"
 

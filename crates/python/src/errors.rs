@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The one place that releases the GIL, and the one that turns Rust errors into Python's.
 
+use bentwing_ndt::NdtError;
 use bentwing_pose_graph::GraphError;
 use bentwing_registration::SolveError;
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
@@ -36,7 +37,7 @@ pub(crate) fn solve_error(py: Python<'_>, error: &SolveError) -> PyErr {
         SolveError::NotFinite => "DivergedError",
         _ => "EstimationError",
     };
-    raised(py, name, error.to_string())
+    raised(py, name, &error.to_string())
 }
 
 /// The Python exception for a pose graph without solution.
@@ -47,10 +48,22 @@ pub(crate) fn graph_error(py: Python<'_>, error: &GraphError) -> PyErr {
         GraphError::Factorization(_) => "EstimationError",
         _ => return PyValueError::new_err(error.to_string()),
     };
-    raised(py, name, error.to_string())
+    raised(py, name, &error.to_string())
 }
 
-fn raised(py: Python<'_>, name: &str, message: String) -> PyErr {
+/// The Python exception for a scan without a pose.
+pub(crate) fn ndt_error(py: Python<'_>, error: &NdtError) -> PyErr {
+    let name = match error {
+        NdtError::TooFewMatches { .. } => "NotEnoughDataError",
+        NdtError::Singular { .. } => "SingularSystemError",
+        NdtError::NotFinite => "DivergedError",
+        _ => "EstimationError",
+    };
+    raised(py, name, &error.to_string())
+}
+
+/// An exception of `bentwing.errors`.
+fn raised(py: Python<'_>, name: &str, message: &str) -> PyErr {
     let class = py.import("bentwing.errors").and_then(|m| m.getattr(name));
     match class.and_then(|c| c.call1((message,))) {
         Ok(exception) => PyErr::from_value(exception),

@@ -11,6 +11,7 @@ use pyo3::prelude::*;
 mod arrays;
 mod errors;
 mod laz;
+mod ndt;
 mod pose_graph;
 mod raycast;
 mod registration;
@@ -23,6 +24,8 @@ mod _core {
 
     #[pymodule_export]
     use crate::laz::LazCompressor;
+    #[pymodule_export]
+    use crate::ndt::{NdtReference, NdtRegistration, thin_points};
     #[pymodule_export]
     use crate::pose_graph::{PoseGraphSolution, solve_pose_graph};
     #[pymodule_export]

@@ -14,7 +14,7 @@ from rich.progress import Progress
 from bentwing.errors import UsageError
 from bentwing.simulate import Scenario, simulate
 from bentwing.simulate.events import EventName
-from bentwing.simulate.scenario import HeadName, SceneName
+from bentwing.simulate.scenario import FlightName, HeadName, SceneName
 
 Option = typer.Option
 
@@ -28,7 +28,10 @@ def simulate_command(  # noqa: PLR0917 - one parameter per option
     out: Annotated[Path, Option("--output", "-o", help="Folder to write into.")],
     head: Annotated[
         str | None,
-        Option(help=f"One of {_names(HeadName)}.", show_default="hokuyo-spin; town: vlp16-motor"),
+        Option(
+            help=f"One of {_names(HeadName)}.",
+            show_default="hokuyo-spin; town, walls, dam: vlp16-motor",
+        ),
     ] = None,
     duration: Annotated[float, Option(help="Length of the recording, s.")] = 60.0,
     seed: Annotated[int, Option(help="Varies geometry, motion, calibration and noise.")] = 0,
@@ -42,9 +45,17 @@ def simulate_command(  # noqa: PLR0917 - one parameter per option
     max_range: Annotated[
         float | None, Option(help="The lidar sees up to here, m.", show_default="the sensor's")
     ] = None,
+    flight: Annotated[
+        str | None,
+        Option(help=f"One of {_names(FlightName)}.", show_default="survey where there is no tour"),
+    ] = None,
     event: Annotated[
         list[str] | None, Option(help=f"Repeatable: {_names(EventName)}.", show_default=False)
     ] = None,
+    *,
+    calibrated: Annotated[
+        bool, Option("--calibrated", help="The payload is exact, the clocks agree.")
+    ] = False,
 ) -> None:
     """Simulate a recording with truth: bag, payload.yaml, trajectory, scene and calibration."""
     choices: dict[str, object] = {
@@ -57,6 +68,8 @@ def simulate_command(  # noqa: PLR0917 - one parameter per option
         "spin": spin,
         "max_range": max_range,
         "events": event or (),
+        "flight": flight,
+        "calibrated": calibrated,
     }
     _run(_scenario(choices), out)
 

@@ -7,15 +7,16 @@ from typing import TYPE_CHECKING, Any
 
 from bentwing.errors import UsageError
 from bentwing.estimators.continuous import Continuous
+from bentwing.estimators.ndt import Ndt
 
 if TYPE_CHECKING:
     from bentwing.estimators.interface import Estimator
     from bentwing.recording import Payload
 
-__all__ = ["AVAILABLE_ESTIMATORS", "ESTIMATORS", "Continuous", "create", "require_estimator"]
+__all__ = ["AVAILABLE_ESTIMATORS", "ESTIMATORS", "Continuous", "Ndt", "create", "require_estimator"]
 
 ESTIMATORS = ("continuous", "kalman", "ndt")
-AVAILABLE_ESTIMATORS = ("continuous",)
+AVAILABLE_ESTIMATORS = ("continuous", "ndt")
 
 
 def create(
@@ -26,7 +27,8 @@ def create(
 ) -> Estimator:
     """Return the estimator `name`, or raise UsageError where there is none of that name."""
     require_estimator(name)
-    return Continuous(payload, settings, threads)
+    engine = Ndt if name == "ndt" else Continuous
+    return engine(payload, settings, threads)
 
 
 def require_estimator(name: str) -> None:

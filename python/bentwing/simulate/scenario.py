@@ -24,10 +24,12 @@ if TYPE_CHECKING:
 
     from bentwing.simulate.rig import Rig
 
-SceneName = Literal["courtyard", "office", "forest", "cave", "mine", "town"]
-HeadName = Literal["hokuyo-spin", "hokuyo-nod", "vlp16-fixed", "vlp16-motor"]
+SceneName = Literal["courtyard", "office", "forest", "cave", "mine", "town", "walls", "dam"]
+HeadName = Literal["hokuyo-spin", "hokuyo-nod", "vlp16-fixed", "vlp16-side", "vlp16-motor"]
 SpinName = Literal["steady", "plant"]
+FlightName = Literal["tour", "survey"]
 Format = Literal["bag", "mcap", "db3"]
+_SURVEYED = ("walls", "dam")
 
 
 class Scenario(BaseModel):
@@ -45,6 +47,8 @@ class Scenario(BaseModel):
         of downdraft, vanes and controller
     max_range : m, beyond it the lidar sees nothing; by default what the sensor can do
     events : what goes wrong
+    flight : a tour from the ground and back, or the site's line in the air (town, walls, dam)
+    calibrated : whether the payload has the head as it is, and the clocks agree
     noiseless : without random errors of the sensors (calibration and clock stay wrong)
     """
 
@@ -59,16 +63,30 @@ class Scenario(BaseModel):
     spin: SpinName = "steady"
     max_range: float | None = Field(default=None, gt=1.0)
     events: tuple[EventName, ...] = ()
+    flight: FlightName = "tour"
+    calibrated: bool = False
     noiseless: bool = False
 
     @model_validator(mode="before")
     @classmethod
     def _choose_head(cls, values: dict[str, Any]) -> dict[str, Any]:
-        """From 30 m above, a town is out of a Hokuyo's reach."""
-        if values.get("head") is None:
-            head = "vlp16-motor" if values.get("scene") == "town" else "hokuyo-spin"
-            return {**values, "head": head}
-        return values
+        """From 30 m above, a town is out of a Hokuyo's reach; walls and dam have but a survey."""
+        scene = values.get("scene")
+        far = scene in {"town", *_SURVEYED}
+        chosen = {"head": "vlp16-motor" if far else "hokuyo-spin"}
+        chosen["flight"] = "survey" if scene in _SURVEYED else "tour"
+        return {**values, **{k: v for k, v in chosen.items() if values.get(k) is None}}
+
+    @model_validator(mode="after")
+    def _can_be_flown(self) -> Scenario:
+        if (self.flight == "survey") != (self.scene in _SURVEYED) and self.scene != "town":
+            only = "survey" if self.scene in _SURVEYED else "tour"
+            msg = f"a {self.scene} has no {self.flight}: choose {only}"
+            raise ValueError(msg)
+        if self.flight == "survey" and self.head == "hokuyo-nod":
+            msg = "hokuyo-nod is carried on foot and flies no survey: choose another head"
+            raise ValueError(msg)
+        return self
 
     def imu_errors(self) -> ImuErrors:
         """Errors of the IMU."""
@@ -111,7 +129,8 @@ def prepare(scenario: Scenario) -> Setup:
     rig = build_rig(scenario, world, last)
     rng = scenario.rng("lidar")
     latency = float(rng.uniform(0.001, 0.004) * rng.choice([-1.0, 1.0]))
-    clock = LidarClock(latency, 0.0 if scenario.noiseless else 1e-4)
+    exact = scenario.noiseless or scenario.calibrated
+    clock = LidarClock(0.0 if scenario.calibrated else latency, 0.0 if exact else 1e-4)
     imu = Imu(scenario.imu_errors(), scenario.rng("imu"), rig.carrier.activity)
     ranger = Ranger(
         world,

@@ -104,7 +104,7 @@ def quadrotor_flight(
         if gusts:
             position = _pushed(rng, position, phases)
         if _is_clear(world, position, phases):
-            return _with_attitude(rng, position, phases, duration)
+            return with_attitude(rng, position, phases, duration)
     msg = f"no flight 0.8 m away from every surface was found in {ATTEMPTS} attempts: try another seed"
     raise UsageError(msg)
 
@@ -156,9 +156,10 @@ def _is_clear(world: World, position: Spline, phases: Phases) -> bool:
     return bool(world.clearance(position(times)).min() > 0.8)
 
 
-def _with_attitude(
+def with_attitude(
     rng: np.random.Generator, position: Spline, phases: Phases, duration: float
 ) -> Flight:
+    """Let the carrier look along its way, and lean as its acceleration and drag demand."""
     yaw_knots = knot_times(YAW_STEP, duration)
     noise = rng.normal(0.0, np.radians(4.0), len(yaw_knots)) * phases.airborne(yaw_knots)
     yaw = smooth_heading(position, phases.cruise, phases.descent, duration, noise)

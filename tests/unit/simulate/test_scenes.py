@@ -8,8 +8,11 @@ from bentwing.simulate.scenes import SCENES, World
 from bentwing.simulate.scenes.mesh import ball, box, column, gable
 from bentwing.simulate.scenes.parts import car, facade, table
 
+# Walls and dam are flown along a line.
+TOURED = sorted(set(SCENES) - {"walls", "dam"})
 
-@pytest.mark.parametrize("name", SCENES)
+
+@pytest.mark.parametrize("name", TOURED)
 def test_every_scene_has_a_tour_clear_of_its_surfaces(name):
     rng = np.random.default_rng(5)
     world = World(SCENES[name](rng))
@@ -20,7 +23,7 @@ def test_every_scene_has_a_tour_clear_of_its_surfaces(name):
     np.testing.assert_array_equal(tour.way_points[0], tour.way_points[-1])
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", TOURED)
 def test_surfaces_face_whoever_flies_along(name):
     rng = np.random.default_rng(6)
     world = World(SCENES[name](rng))
@@ -34,7 +37,7 @@ def test_surfaces_face_whoever_flies_along(name):
     assert facing.mean() > (0.8 if name == "forest" else 0.995)
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", sorted(set(SCENES) - {"walls"}))
 def test_seeds_change_the_geometry(name):
     one, other = (SCENES[name](np.random.default_rng(seed)).mesh for seed in (1, 2))
     assert one.vertices.shape != other.vertices.shape or (one.vertices != other.vertices).any()

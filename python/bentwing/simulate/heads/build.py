@@ -12,10 +12,11 @@ from bentwing.simulate.heads.airframe import LEG_LENGTH
 from bentwing.simulate.heads.hokuyo_nod import NOD_STEP, hokuyo_nod
 from bentwing.simulate.heads.hokuyo_spin import hokuyo_spin
 from bentwing.simulate.heads.rates import SPIN_STEP, spin_angle, spin_drive
-from bentwing.simulate.heads.vlp16 import MOTOR_STEP, vlp16_fixed, vlp16_motor
+from bentwing.simulate.heads.vlp16 import MOTOR_STEP, vlp16_fixed, vlp16_motor, vlp16_side
 from bentwing.simulate.plant.profile import driven_spin, flight_air
 from bentwing.simulate.rig import Head, Rig
 from bentwing.simulate.splines import knot_times
+from bentwing.simulate.survey import survey_flight
 from bentwing.simulate.trajectories import Flight, quadrotor_flight
 from bentwing.simulate.walk import walk
 
@@ -35,15 +36,25 @@ def build_rig(scenario: Scenario, world: World, duration: float) -> Rig:
     rng = scenario.rng("head")
     if scenario.head == "hokuyo-nod":
         return _nodding(scenario, world, rng, duration)
-    gusts = "gusts" in scenario.events
-    flight = quadrotor_flight(world, scenario.rng("flight"), duration, LEG_LENGTH, gusts=gusts)
+    flight = _flight(scenario, world, duration)
     if scenario.head == "hokuyo-spin":
         return Rig(flight, _spun(scenario, flight, rng, duration))
     max_range = scenario.max_range or VLP16_RANGE
+    exact = scenario.calibrated
     if scenario.head == "vlp16-fixed":
-        return Rig(flight, vlp16_fixed(rng, max_range))
+        return Rig(flight, vlp16_fixed(rng, max_range, exact=exact))
+    if scenario.head == "vlp16-side":
+        return Rig(flight, vlp16_side(rng, max_range, exact=exact))
     drive = _drive(scenario, MOTOR_STEP, duration)
-    return Rig(flight, vlp16_motor(rng, scenario.motor_rate, drive, max_range))
+    return Rig(flight, vlp16_motor(rng, scenario.motor_rate, drive, max_range, exact=exact))
+
+
+def _flight(scenario: Scenario, world: World, duration: float) -> Flight:
+    rng, survey = scenario.rng("flight"), world.site.survey
+    if scenario.flight == "survey" and survey is not None:
+        return survey_flight(survey, rng, duration)
+    gusts = "gusts" in scenario.events
+    return quadrotor_flight(world, rng, duration, LEG_LENGTH, gusts=gusts)
 
 
 def _spun(scenario: Scenario, flight: Flight, rng: np.random.Generator, duration: float) -> Head:

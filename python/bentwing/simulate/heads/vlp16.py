@@ -28,37 +28,52 @@ AXIS = np.array([0.0, 0.0, 1.0])
 ON_ITS_SIDE = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 """R_motor_lidar: the lidar's x down, its own axis z along the motor's x."""
 
+UPRIGHT = {"box": {"min": [-0.65, -0.65, -0.35], "max": [0.65, 0.65, 0.3]}}
+SIDEWAYS = {"box": {"min": [-0.3, -0.65, -0.65], "max": [0.32, 0.65, 0.65]}}
+"""The carrier in the frame of a lidar that stands, and of one that lies on its side."""
+
 T_body_imu = Mount(np.eye(3), np.array([0.03, 0.0, 0.02]))
 MOTOR_STEP = 0.1
 
 
-def vlp16_fixed(rng: np.random.Generator, max_range: float) -> Head:
-    """Build the lidar level under the body."""
+def vlp16_fixed(rng: np.random.Generator, max_range: float, *, exact: bool = False) -> Head:
+    """Build the lidar level under the body; `exact` as its user believes it to be."""
+    return _fixed(rng, Mount(np.eye(3), np.array([0.02, 0.0, -0.14])), max_range, exact=exact)
+
+
+def vlp16_side(rng: np.random.Generator, max_range: float, *, exact: bool = False) -> Head:
+    """Build the lidar on its side, as a motor at rest has it (Tazir 2020, eqs. 1 to 3)."""
+    return _fixed(rng, Mount(ON_ITS_SIDE, np.array([0.0, 0.0, -0.17])), max_range, exact=exact)
+
+
+def _fixed(rng: np.random.Generator, nominal: Mount, max_range: float, *, exact: bool) -> Head:
     lidar = Vlp16(max_range=max_range)
-    nominal = Mount(np.eye(3), np.array([0.02, 0.0, -0.14]))
-    true = nominal.perturbed(rng, np.radians(0.5), 0.004)
+    true = nominal if exact else nominal.perturbed(rng, np.radians(0.5), 0.004)
     payload = {
         "lidar": _lidar(lidar),
         "T_imu_lidar": nominal.as_dict(),
-        "self_hits": [{"box": {"min": [-0.65, -0.65, -0.35], "max": [0.65, 0.65, 0.3]}}],
+        "self_hits": [UPRIGHT if np.array_equal(nominal.R, np.eye(3)) else SIDEWAYS],
     }
     truth = {"T_imu_lidar": true.as_dict()}
     return Head([T_body_imu], [true], quadrotor(), lidar, payload, truth)
 
 
-def vlp16_motor(rng: np.random.Generator, rate: float, drive: Array, max_range: float) -> Head:
+def vlp16_motor(
+    rng: np.random.Generator, rate: float, drive: Array, max_range: float, *, exact: bool = False
+) -> Head:
     """Build the lidar on a motor that turns at `rate` rad/s times `drive` (at the knots of `MOTOR_STEP`)."""
     lidar = Vlp16(max_range=max_range)
     motor = Mount(np.eye(3), np.array([0.0, 0.0, -0.10]))
     nominal = Mount(ON_ITS_SIDE, np.array([0.0, 0.0, -0.07]))
     # What is unknown of T_imu_lidar sits before the motor, the misalignment behind it.
-    true_motor = motor.perturbed(rng, np.radians(0.3), 0.003)
-    true = nominal.perturbed(rng, np.radians(0.25), 0.002)
+    true_motor = motor if exact else motor.perturbed(rng, np.radians(0.3), 0.003)
+    true = nominal if exact else nominal.perturbed(rng, np.radians(0.25), 0.002)
     angle = _motor_angle(rng, rate, drive)
-    encoder = Encoder(angle, zero=float(rng.uniform(-0.004, 0.004)), sigma=2e-4)
+    zero = 0.0 if exact else float(rng.uniform(-0.004, 0.004))
+    encoder = Encoder(angle, zero=zero, sigma=2e-4)
     payload = {
         "lidar": _lidar(lidar),
-        "self_hits": [{"box": {"min": [-0.3, -0.65, -0.65], "max": [0.32, 0.65, 0.65]}}],
+        "self_hits": [SIDEWAYS],
         "encoder": {"topic": "/encoder", "axis": AXIS.tolist(), **_motor(motor, nominal)},
     }
     truth = {"encoder": _motor(true_motor, true), "encoder_zero": round(encoder.zero, 9)}

@@ -7,18 +7,20 @@ from typing import TYPE_CHECKING
 
 from bentwing.simulate.scenes.cave import cave
 from bentwing.simulate.scenes.courtyard import courtyard
+from bentwing.simulate.scenes.dam import dam
 from bentwing.simulate.scenes.forest import forest
 from bentwing.simulate.scenes.mine import mine
 from bentwing.simulate.scenes.office import office
 from bentwing.simulate.scenes.town import town
-from bentwing.simulate.scenes.world import Site, World
+from bentwing.simulate.scenes.walls import walls
+from bentwing.simulate.scenes.world import Site, Survey, World
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     import numpy as np
 
-__all__ = ["SCENES", "Site", "World"]
+__all__ = ["SCENES", "Site", "Survey", "World"]
 
 SCENES: dict[str, Callable[[np.random.Generator], Site]] = {
     "courtyard": courtyard,
@@ -27,4 +29,6 @@ SCENES: dict[str, Callable[[np.random.Generator], Site]] = {
     "cave": cave,
     "mine": mine,
     "town": town,
+    "walls": walls,
+    "dam": dam,
 }

@@ -7,7 +7,7 @@ import numpy as np
 
 from bentwing.simulate.scenes.mesh import Mesh, box, gable, ground, merge, smooth_noise
 from bentwing.simulate.scenes.parts import car, tree
-from bentwing.simulate.scenes.world import Site
+from bentwing.simulate.scenes.world import Site, Survey
 
 BLOCK = (24.0, 22.0)
 """m, from one street to the next."""
@@ -25,7 +25,9 @@ def town(rng: np.random.Generator) -> Site:
             z = float(height(corner[None] + 10.0)[0])
             parts += [part.moved((*corner, z)) for part in _plot(rng)]
     low, high = (15.0, 15.0, 25.0), (length - 15.0, width - 15.0, 33.0)
-    return Site(merge(parts), low, high, pad_below=1.5, speed=2.0)
+    # Tazir 2020, experiment 1: 100 m at 30 m above the ground and 1 m/s.
+    survey = Survey(((30.0, 30.0, 30.0), (80.0, 30.0, 30.0), (80.0, 80.0, 30.0)), speed=1.0)
+    return Site(merge(parts), low, high, pad_below=1.5, speed=2.0, survey=survey)
 
 
 def _plot(rng: np.random.Generator) -> list[Mesh]:

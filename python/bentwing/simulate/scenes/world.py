@@ -19,6 +19,22 @@ Point = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
+class Survey:
+    """A flight on a line that begins and ends in the air.
+
+    Attributes
+    ----------
+    way_points : m; a single one is where the carrier stands still
+    speed : m/s
+    pitch : rad, of a carrier that stands still
+    """
+
+    way_points: tuple[Point, ...]
+    speed: float
+    pitch: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
 class Site:
     """What a scene's builder returns.
 
@@ -28,6 +44,7 @@ class Site:
     low, high : corners of the box in which to fly, m
     pad_below : m, highest ground from which to take off
     speed : m/s, at which one flies here
+    survey : the line to fly instead of a tour through the box, where there is one
     """
 
     mesh: Mesh
@@ -35,6 +52,7 @@ class Site:
     high: Point
     pad_below: float
     speed: float
+    survey: Survey | None = None
 
 
 class World:

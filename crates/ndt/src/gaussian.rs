@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! The normal distribution of the surface in one voxel.
+
+use bentwing_surfels::{Moments, sym3};
+use bentwing_trajectory::so3;
+use nalgebra::{Matrix3, Vector3};
+
+/// A voxel with fewer points says nothing.
+const MIN_POINTS: u32 = 6;
+/// The middle standard deviation, in voxels, below which the points are one scan line: the surface
+/// is then free to turn about it. Along a surface points end where the voxel does or where the scan
+/// lines lay, and an edge of the voxel filled evenly has 0.29; so whatever is wider than this is no
+/// shape of the surface.
+const MIN_WIDTH: f64 = 0.07;
+
+/// What regularizes the distributions.
+#[derive(Clone, Copy, Debug)]
+pub struct Shape {
+    /// Least standard deviation, m: the noise of a range.
+    pub sigma: f64,
+    /// Least standard deviation in voxels, the eigenvalue floor of Magnusson 2009, section 6.2.
+    pub roughness: f64,
+}
+
+/// A normal distribution with the information it gives about a point.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Gaussian {
+    pub mean: Vector3<f64>,
+    /// Σ (1/λ − 1/λ_cut) u uᵀ over the eigenvectors u, none negative, 1/m².
+    pub information: Matrix3<f64>,
+    /// Largest eigenvalue of `information`, 1/m².
+    pub sharpest: f64,
+}
+
+impl Gaussian {
+    /// Distribution of the points in a voxel of edge `size` around `middle`, if they show a surface.
+    ///
+    /// The inverse of the covariance would pull scans along the surface too, to where the keyframe's
+    /// lines lay and so towards not having moved; what a wide distribution has is therefore taken off.
+    pub(crate) fn of(
+        moments: &Moments,
+        middle: &Vector3<f64>,
+        size: f64,
+        shape: &Shape,
+    ) -> Option<Self> {
+        if moments.n() < MIN_POINTS {
+            return None;
+        }
+        let covariance = moments.covariance();
+        let (values, axes) = eigen(&covariance);
+        let wide = (MIN_WIDTH * size).powi(2);
+        if values[1] < wide {
+            return None;
+        }
+        let floor = shape.sigma.max(shape.roughness * size).powi(2);
+        let cut = 1.0 / wide;
+        let gains = values.map(|v| (1.0 / v.max(floor) - cut).max(0.0));
+        if gains[0] <= 0.0 {
+            return None;
+        }
+        let parts = axes.iter().zip(gains).map(|(u, g)| u * u.transpose() * g);
+        Some(Self {
+            mean: middle + moments.mean(),
+            information: parts.sum(),
+            sharpest: gains[0],
+        })
+    }
+}
+
+/// Eigenvalues in increasing order, and their eigenvectors.
+fn eigen(a: &Matrix3<f64>) -> ([f64; 3], [Vector3<f64>; 3]) {
+    let e = sym3::eigen(a);
+    let [u, v] = so3::orthogonal_pair(&e.normal);
+    // Across the first eigenvector the matrix is 2 × 2.
+    let (uu, uv, vv) = (u.dot(&(a * u)), u.dot(&(a * v)), v.dot(&(a * v)));
+    let (sin, cos) = (0.5 * (2.0 * uv).atan2(uu - vv)).sin_cos();
+    let (largest, middle) = (u * cos + v * sin, v * cos - u * sin);
+    (e.values, [e.normal, middle, largest])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::UnitQuaternion;
+    use proptest::prelude::*;
+
+    const SHAPE: Shape = Shape {
+        sigma: 0.02,
+        roughness: 0.02,
+    };
+
+    fn moments(points: impl Iterator<Item = Vector3<f64>>) -> Option<Moments> {
+        points.fold(None, |sums, p| match sums {
+            None => Some(Moments::of_point(p.into(), 0.0, 0.0)),
+            Some(mut sums) => {
+                sums.add_point(p.into(), 0.0, 0.0);
+                Some(sums)
+            }
+        })
+    }
+
+    proptest! {
+        #[test]
+        fn eigenvectors_rebuild_the_matrix(
+            l1 in 1e-4..1e-2_f64, f2 in 1.5..20.0_f64, f3 in 1.5..20.0_f64,
+            a in -3.0..3.0_f64, b in -3.0..3.0_f64, c in -3.0..3.0_f64,
+        ) {
+            let diagonal = Vector3::new(l1, l1 * f2, l1 * f2 * f3);
+            let R = UnitQuaternion::from_euler_angles(a, b, c).to_rotation_matrix().into_inner();
+            let m = R * Matrix3::from_diagonal(&diagonal) * R.transpose();
+            let (values, axes) = eigen(&m);
+            let rebuilt: Matrix3<f64> = (0..3).map(|i| axes[i] * axes[i].transpose() * values[i]).sum();
+            prop_assert!((rebuilt - m).norm() < 1e-9 * m.norm());
+        }
+
+        #[test]
+        fn a_tilted_plane_gives_information_along_its_normal_alone(a in -3.0..3.0_f64, b in -3.0..3.0_f64) {
+            let R = UnitQuaternion::from_euler_angles(a, b, 0.0);
+            let grid = (0..400).map(|i| R * Vector3::new(f64::from(i % 20) * 0.05 - 0.475, f64::from(i / 20) * 0.05 - 0.475, 0.0));
+            let middle = Vector3::new(7.0, -3.0, 2.0);
+            let found = moments(grid).and_then(|m| Gaussian::of(&m, &middle, 1.0, &SHAPE));
+            prop_assert!(found.is_some());
+            if let Some(g) = found {
+                let n = R * Vector3::z();
+                let expected_gain = 2500.0 - (MIN_WIDTH * 1.0).powi(-2);
+                let expected = n * n.transpose() * expected_gain;
+                prop_assert!((g.information - expected).norm() < 1e-6 * expected.norm());
+                prop_assert!((g.sharpest - expected_gain).abs() < 1e-6);
+                prop_assert!((g.mean - middle).norm() < 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn a_scan_line_few_points_and_a_full_voxel_say_nothing() {
+        let line =
+            (0..40).map(|i| Vector3::new(f64::from(i) * 0.02, 0.001 * f64::from(i % 3), 0.0));
+        let few = (0..5).map(|i| Vector3::new(f64::from(i % 2), f64::from(i / 2), 0.0));
+        let full = (0..1000).map(|i| {
+            Vector3::new(
+                f64::from(i % 10),
+                f64::from(i / 10 % 10),
+                f64::from(i / 100),
+            ) * 0.1
+        });
+        let of =
+            |m: Option<Moments>| m.and_then(|m| Gaussian::of(&m, &Vector3::zeros(), 1.0, &SHAPE));
+        assert!(of(moments(line)).is_none());
+        assert!(of(moments(few)).is_none());
+        assert!(of(moments(full)).is_none());
+    }
+}

@@ -26,7 +26,7 @@ pub struct Shape {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Gaussian {
     pub mean: Vector3<f64>,
-    /// Σ (1/λ − 1/λ_cut) u uᵀ over the eigenvectors u, none negative, 1/m².
+    /// `Σ (1/λ − 1/λ_cut) u uᵀ` over the eigenvectors u, none negative, 1/m².
     pub information: Matrix3<f64>,
     /// Largest eigenvalue of `information`, 1/m².
     pub sharpest: f64,

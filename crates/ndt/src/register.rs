@@ -143,7 +143,7 @@ impl Search<'_> {
         };
         let mut damping = 0.0;
         for _ in 1..MAX_EVALUATIONS {
-            let step = self.step(&here.sums, damping)?;
+            let step = damped_step(&here.sums, damping)?;
             if is_short(&step, last_step) {
                 here.converged = true;
                 break;
@@ -202,26 +202,6 @@ impl Search<'_> {
         Vector6::new(r, r, r, t, t, t)
     }
 
-    /// The damped Gauss-Newton step.
-    fn step(&self, sums: &Sums, damping: f64) -> Result<Vector6<f64>, NdtError> {
-        let mut h = sums.hessian;
-        for i in 0..6 {
-            h[(i, i)] *= 1.0 + damping;
-        }
-        if !(sums.cost.is_finite() && h.iter().all(|v| v.is_finite())) {
-            return Err(NdtError::NotFinite);
-        }
-        let singular = NdtError::Singular {
-            matched: sums.n_matched,
-        };
-        let step = h.cholesky().ok_or(singular)?.solve(&-sums.gradient);
-        if step.iter().all(|v| v.is_finite()) {
-            Ok(step)
-        } else {
-            Err(NdtError::NotFinite)
-        }
-    }
-
     fn finish(self, found: &Found) -> Result<Registration, NdtError> {
         let sums = &found.sums;
         let information = Matrix6::from_diagonal(&self.information());
@@ -259,6 +239,26 @@ pub(crate) fn moved(pose: &Isometry3<f64>, step: &Vector6<f64>) -> Isometry3<f64
         Translation3::from(shifted),
         UnitQuaternion::new_normalize(turned.into_inner()),
     )
+}
+
+/// The damped Gauss-Newton step.
+fn damped_step(sums: &Sums, damping: f64) -> Result<Vector6<f64>, NdtError> {
+    let mut h = sums.hessian;
+    for i in 0..6 {
+        h[(i, i)] *= 1.0 + damping;
+    }
+    if !(sums.cost.is_finite() && h.iter().all(|v| v.is_finite())) {
+        return Err(NdtError::NotFinite);
+    }
+    let singular = NdtError::Singular {
+        matched: sums.n_matched,
+    };
+    let step = h.cholesky().ok_or(singular)?.solve(&-sums.gradient);
+    if step.iter().all(|v| v.is_finite()) {
+        Ok(step)
+    } else {
+        Err(NdtError::NotFinite)
+    }
 }
 
 #[cfg(test)]

@@ -13,11 +13,16 @@ use pyo3::types::PyBytes;
 
 use crate::errors::in_pool;
 
+/// LAZ chunks that are compressed at a time. Only whole ones are compressed beside each other.
+const CHUNKS: usize = 4;
+
 /// Appends compressed points to a file whose header is written already.
 #[pyclass(module = "bentwing._core")]
 pub(crate) struct LazCompressor {
     vlr: LazVlr,
     point_size: usize,
+    /// Points that do not fill their chunks yet.
+    waiting: Vec<u8>,
     file: Option<ParLasZipCompressor<File>>,
 }
 
@@ -32,6 +37,7 @@ impl LazCompressor {
         Ok(Self {
             vlr,
             point_size,
+            waiting: Vec::new(),
             file: None,
         })
     }
@@ -69,15 +75,28 @@ impl LazCompressor {
             );
             return Err(PyValueError::new_err(message));
         }
-        let file = begun(&mut self.file)?;
-        Ok(in_pool(py, threads, || file.compress_many(bytes))??)
+        let (file, waiting) = (begun(&mut self.file)?, &mut self.waiting);
+        let whole = CHUNKS * self.vlr.chunk_size() as usize * self.point_size;
+        let work = || {
+            waiting.extend_from_slice(bytes);
+            let n = waiting.len() / whole * whole;
+            file.compress_many(&waiting[..n])?;
+            waiting.drain(..n);
+            Ok::<(), std::io::Error>(())
+        };
+        Ok(in_pool(py, threads, work)??)
     }
 
     /// Writes what is held back and the table of chunks.
     #[pyo3(signature = (*, threads=0))]
     fn finish(&mut self, py: Python<'_>, threads: usize) -> PyResult<()> {
-        let file = begun(&mut self.file)?;
-        in_pool(py, threads, || file.done())?.map_err(os_error)?;
+        let (file, waiting) = (begun(&mut self.file)?, &mut self.waiting);
+        let work = || {
+            file.compress_many(waiting).map_err(LasZipError::IoError)?;
+            file.done()
+        };
+        in_pool(py, threads, work)?.map_err(os_error)?;
+        self.waiting.clear();
         self.file = None;
         Ok(())
     }

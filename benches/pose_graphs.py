@@ -7,7 +7,7 @@ FOLDER holds the public `.g2o` files. GTSAM (`pip install gtsam`) runs in the in
 which needs nothing of ours: Levenberg–Marquardt with its default settings from the file's poses and
 from its chordal start; the one with the lower cost counts, with the time of its start, and of equal
 ones the faster. Its graph is the one that our reader made, so that both minimize the same
-½ Σ rᵀΩr: in cubicle 5021 informations are indefinite and become the nearest that are not. Both use
+½ Σ rᵀΩr: in cubicle 5021 information matrices are indefinite and become the nearest that are not. Both use
 one thread; the repetitions are interleaved.
 
 False links join nodes drawn at random by what a true loop link has measured. The error is the root

@@ -42,7 +42,7 @@ def test_the_cost_is_the_lowest_known_to_a_thousandth_within_six_iterations(read
     assert solution.iterations <= 6
 
 
-def test_informations_that_are_none_are_counted(read):
+def test_information_that_is_none_is_counted(read):
     assert read("cubicle").n_repaired == 5021
 
 

@@ -43,7 +43,7 @@ def test_without_a_fix_the_first_node_is_fixed(read):
     assert read(VALID.replace("FIX 3\n", "")).graph.fixed.tolist() == [True, False]
 
 
-def test_informations_become_rotation_first(read):
+def test_information_becomes_rotation_first(read):
     upper = np.triu(np.arange(1.0, 37).reshape(6, 6) / 100) + 10 * np.eye(6)
     text = " ".join(map(str, upper[np.triu_indices(6)]))
     information = read(VALID.replace(IDENTITY, text)).graph.links.information[0]

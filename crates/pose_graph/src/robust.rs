@@ -3,7 +3,7 @@
 //! the `Geman`–`McClure` kernel.
 //!
 //! The kernel's cost has many minima; so it is approached from a convex one, by a width that falls to
-//! its last. Informations are seldom right to a factor, and residuals of true links grow while
+//! its last. Information matrices are seldom right to a factor, and residuals of true links grow while
 //! false ones pull; so they are measured by their median, not by what they should be. Up to half
 //! of the doubtful links may therefore be false.
 

@@ -149,10 +149,10 @@ pub(crate) fn solve_pose_graph(
 fn links_of(links: &LinkArrays<'_>) -> PyResult<Vec<Link>> {
     let ends: &[[i64; 2]] = rows("links.nodes", &links.nodes)?;
     let measured = poses("links.", &links.positions, &links.quats_xyzw)?;
-    let informations = matrices("links.information", &links.information)?;
+    let omegas = matrices("links.information", &links.information)?;
     let trusted = flags("links.trusted", &links.trusted)?;
     same_length("links.nodes", ends.len(), measured.len())?;
-    same_length("links.information", informations.len(), measured.len())?;
+    same_length("links.information", omegas.len(), measured.len())?;
     same_length("links.trusted", trusted.len(), measured.len())?;
     let link = |row: usize| {
         Ok(Link {
@@ -162,7 +162,7 @@ fn links_of(links: &LinkArrays<'_>) -> PyResult<Vec<Link>> {
             },
             to: index("links.nodes", row, ends[row][1])?,
             T_from_to: measured[row],
-            information: Matrix6::from_row_slice(&informations[row]),
+            information: Matrix6::from_row_slice(&omegas[row]),
             trusted: trusted[row],
         })
     };

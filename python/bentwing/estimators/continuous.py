@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 
 # A rest shorter than this is waited out before the start is judged, s.
 LOOK_AHEAD = 6.0
-# Behind a break the motion is a guess that must not grow until the lidar corrects it: so many windows
-# instead of one.
-STEPS_BEHIND_BREAK = 3
+# At the beginning and behind a break the motion is a guess that must not grow until the lidar corrects
+# it: so many windows instead of one.
+CAREFUL_STEPS = 3
 
 
 class Continuous:
@@ -199,8 +199,10 @@ class Continuous:
 
     @property
     def _new_data(self) -> float:
-        """How much of it the next window takes, s: little as long as a break is not bridged."""
-        return self._sliding.shift / (1 if self._bridged is None else STEPS_BEHIND_BREAK)
+        """How much of it the next window takes, s: little as long as the motion is a guess."""
+        settling = self._pass is not None and self._pass.is_settling
+        guessed = settling or self._bridged is not None
+        return self._sliding.shift / (CAREFUL_STEPS if guessed else 1)
 
     def _settle(self, end: float) -> None:
         """Judge a bridge when enough was seen behind it, and forget what no window needs."""

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
 """Pose graphs as `.g2o` files: `VERTEX_SE3:QUAT`, `EDGE_SE3:QUAT` and `FIX`.
 
-A file gives informations translation first and for the vector part of the error's quaternion; as
+A file gives information matrices translation first and for the vector part of the error's quaternion; as
 in GTSAM they are taken for the logarithm of the error, and reordered to rotation first.
 """
 
@@ -37,7 +37,7 @@ class G2oGraph:
         first node is fixed where no `FIX` names one
     ids : (N,) int64, the file's numbers of the nodes
     unknown_tags : how many lines had a tag that is not understood, by tag
-    n_repaired : informations that were not positive semidefinite and became the nearest that is
+    n_repaired : information matrices that were not positive semidefinite and became the nearest that is
     """
 
     graph: PoseGraph

@@ -12,9 +12,9 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from bentwing.atomic import TEMPORARY_SUFFIX, write_text
+from bentwing.atomic import write_text
 from bentwing.errors import UsageError
-from bentwing.run_record import describe_input, plain, versions
+from bentwing.run_record import RecordedFolder, describe_input, plain, versions
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 RECORD = "run.json"
 _KIND = "bentwing run"
+_FOLDER = RecordedFolder(RECORD, _KIND, "run")
 
 
 class RunFolder:
@@ -72,7 +73,7 @@ class RunFolder:
         self._started = time.monotonic()
 
     def __enter__(self) -> Self:
-        self._earlier = _claim(self.path)
+        self._earlier = _FOLDER.claim(self.path)
         self.save()
         return self
 
@@ -160,39 +161,11 @@ def read_record(run: Path) -> dict[str, Any]:
     UsageError
         If the folder holds no bentwing run.
     """
-    record = _record(Path(run))
+    record = _FOLDER.read(Path(run))
     if record is None:
         msg = f"{run}: holds no bentwing run ({RECORD} is missing or of another program)"
         raise UsageError(msg)
     return record
-
-
-def _claim(path: Path) -> list[str]:
-    """Make the folder ours; return the names of the files of the run that was there."""
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-        entries = list(path.iterdir())
-    except OSError as error:
-        msg = f"{path}: cannot be made the folder of a run ({error.strerror}); choose another"
-        raise UsageError(msg) from error
-    leftovers = [entry for entry in entries if entry.name.endswith(TEMPORARY_SUFFIX)]
-    record = _record(path)
-    if record is None and len(entries) > len(leftovers):
-        msg = f"{path}: is not empty and holds no earlier run; choose a new or empty folder"
-        raise UsageError(msg)
-    for entry in leftovers:
-        entry.unlink()
-    record = record or {}
-    names = [*record.get("files", []), *record.get("files_of_earlier_run", [])]
-    return [name for name in names if isinstance(name, str) and Path(name).name == name]
-
-
-def _record(path: Path) -> dict[str, Any] | None:
-    try:
-        record = json.loads((path / RECORD).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return None
-    return record if isinstance(record, dict) and record.get("kind") == _KIND else None
 
 
 def _peak_memory() -> int:

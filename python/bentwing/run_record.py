@@ -4,15 +4,19 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import math
 import os
 import platform
-from dataclasses import fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+from bentwing.atomic import TEMPORARY_SUFFIX
+from bentwing.errors import UsageError
 
 FULL_HASH_LIMIT = 256 * 2**20  # bytes; larger files are hashed at both ends only
 _END = 2**20
@@ -73,3 +77,58 @@ def plain(value: Any) -> Any:  # noqa: ANN401 - takes and returns whatever JSON 
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value
+
+
+@dataclass(frozen=True, slots=True)
+class RecordedFolder:
+    """Folders of one kind, which are told by the record they hold.
+
+    Attributes
+    ----------
+    record : name of the record's file
+    kind : what the record says it is
+    noun : what the folder holds, for messages
+    article : of the noun
+    """
+
+    record: str
+    kind: str
+    noun: str
+    article: str = "a"
+
+    def read(self, path: Path) -> dict[str, Any] | None:
+        """Return the record in a folder, None without one of this kind."""
+        try:
+            record = json.loads((path / self.record).read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return None
+        return record if isinstance(record, dict) and record.get("kind") == self.kind else None
+
+    def claim(self, path: Path) -> list[str]:
+        """Make the folder ours; return the names of the files of what was there.
+
+        Raises
+        ------
+        UsageError
+            If the path cannot be a folder, or holds files of something else.
+        """
+        try:
+            path.mkdir(parents=True, exist_ok=True)
+            entries = list(path.iterdir())
+        except OSError as error:
+            what = f"{self.article} {self.noun}"
+            msg = f"{path}: cannot be made the folder of {what} ({error.strerror}); choose another"
+            raise UsageError(msg) from error
+        leftovers = [entry for entry in entries if entry.name.endswith(TEMPORARY_SUFFIX)]
+        record = self.read(path)
+        if record is None and len(entries) > len(leftovers):
+            msg = (
+                f"{path}: is not empty and holds no earlier {self.noun}; "
+                "choose a new or empty folder"
+            )
+            raise UsageError(msg)
+        for entry in leftovers:
+            entry.unlink()
+        record = record or {}
+        names = [*record.get("files", []), *record.get("files_of_earlier_run", [])]
+        return [name for name in names if isinstance(name, str) and Path(name).name == name]

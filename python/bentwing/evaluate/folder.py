@@ -7,10 +7,9 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from bentwing.atomic import TEMPORARY_SUFFIX, write_text
-from bentwing.errors import UsageError
+from bentwing.atomic import write_text
 from bentwing.evaluate.statistics import summary
-from bentwing.run_record import describe_input, plain, versions
+from bentwing.run_record import RecordedFolder, describe_input, plain, versions
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -19,6 +18,7 @@ if TYPE_CHECKING:
 
 RECORD = "evaluation.json"
 _KIND = "bentwing evaluation"
+_FOLDER = RecordedFolder(RECORD, _KIND, "evaluation", "an")
 
 
 class EvaluationFolder:
@@ -36,7 +36,7 @@ class EvaluationFolder:
 
     def __init__(self, out: Path) -> None:
         self.path = Path(out)
-        self._earlier = _claim(self.path)
+        self._earlier = _FOLDER.claim(self.path)
         self._files: list[str] = []
 
     def file(self, name: str) -> Path:
@@ -65,32 +65,3 @@ class EvaluationFolder:
     def _write(self, record: dict[str, Any]) -> None:
         text = json.dumps(plain(record), indent=1, allow_nan=False)
         write_text(self.path / RECORD, text + "\n")
-
-
-def _claim(path: Path) -> list[str]:
-    """Make the folder ours; return the names of the figures of an earlier evaluation."""
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-        entries = list(path.iterdir())
-    except OSError as error:
-        msg = (
-            f"{path}: cannot be made the folder of an evaluation ({error.strerror}); choose another"
-        )
-        raise UsageError(msg) from error
-    leftovers = [entry for entry in entries if entry.name.endswith(TEMPORARY_SUFFIX)]
-    record = _record(path)
-    if record is None and len(entries) > len(leftovers):
-        msg = f"{path}: is not empty and holds no earlier evaluation; choose a new or empty folder"
-        raise UsageError(msg)
-    for entry in leftovers:
-        entry.unlink()
-    names = (record or {}).get("files", [])
-    return [name for name in names if isinstance(name, str) and Path(name).name == name]
-
-
-def _record(path: Path) -> dict[str, Any] | None:
-    try:
-        record = json.loads((path / RECORD).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return None
-    return record if isinstance(record, dict) and record.get("kind") == _KIND else None

@@ -75,11 +75,11 @@ pub fn find(placed: &Placed, views: &[&FixedView], settings: &Settings) -> Vec<M
         .collect();
     let plane = |&pair: &Pair| {
         let surfel = &placed.surfels[pair.0 as usize];
-        let covariance = match pair.1 {
-            Target::Moving(j) => &placed.surfels[j as usize].covariance,
-            Target::Fixed(v, j) => &views[v as usize].surfels[j as usize].covariance,
+        let other = match pair.1 {
+            Target::Moving(j) => &placed.surfels[j as usize],
+            Target::Fixed(v, j) => &views[v as usize].surfels[j as usize],
         };
-        let plane = MatchPlane::new(surfel, covariance, settings.range_sigma);
+        let plane = MatchPlane::new(surfel, other, settings.range_sigma);
         let group = group(placed, pair);
         Match { pair, plane, group }
     };

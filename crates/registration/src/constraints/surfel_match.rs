@@ -19,17 +19,25 @@ pub struct MatchPlane {
     /// Eigenvector of the smallest eigenvalue of `S_i + S_j`, in the IMU frame at the time of the
     /// surfel, with which it turns from iteration to iteration.
     normal_imu: Vector3<f64>,
-    /// `ξ² = 1 / (σ_r² + λ1)`, m⁻².
+    /// `ξ² = 1 / (σ_r² + λ1 (1 + q))`, m⁻².
     pub information: f64,
 }
 
 impl MatchPlane {
-    /// The plane between a surfel and the covariance of its counterpart, map frame.
-    pub fn new(surfel: &PlacedSurfel, covariance: &Matrix3<f64>, range_sigma: f64) -> Self {
-        let eigen = sym3::eigen(&(surfel.covariance + covariance));
+    /// The plane between two surfels.
+    ///
+    /// Further than eq. 6 goes: λ1, the roughness of both patches, also lets the normal turn, and an
+    /// error of the normal counts with the way between the means. In units of the patches' own
+    /// extents that way is `q = dᵀ S⁻¹ d` in the plane; the plane extrapolated so far is uncertain by
+    /// `λ1 q`. Without it narrow patches far apart are too certain of the sensor's yaw.
+    pub fn new(surfel: &PlacedSurfel, other: &PlacedSurfel, range_sigma: f64) -> Self {
+        let covariance = surfel.covariance + other.covariance;
+        let eigen = sym3::eigen(&covariance);
+        let roughness = eigen.values[0].max(0.0);
+        let q = distance_in_plane(&covariance, &eigen, &(surfel.mean - other.mean));
         Self {
             normal_imu: surfel.R_map_imu.tr_mul(&eigen.normal),
-            information: 1.0 / (range_sigma * range_sigma + eigen.values[0].max(0.0)),
+            information: 1.0 / (range_sigma * range_sigma + roughness * (1.0 + q)),
         }
     }
 
@@ -38,6 +46,16 @@ impl MatchPlane {
     pub fn normal(&self, surfel: &PlacedSurfel) -> Vector3<f64> {
         surfel.R_map_imu * self.normal_imu
     }
+}
+
+/// Squared Mahalanobis distance of `apart` within the plane of the two larger eigenvalues.
+fn distance_in_plane(covariance: &Matrix3<f64>, eigen: &sym3::Eigen, apart: &Vector3<f64>) -> f64 {
+    let n = &eigen.normal;
+    let along = apart - n * n.dot(apart);
+    let [_, l2, l3] = eigen.values;
+    // The inverse in two dimensions, after Cayley and Hamilton.
+    let q = ((l2 + l3) * along.norm_squared() - along.dot(&(covariance * along))) / (l2 * l3);
+    q.max(0.0)
 }
 
 /// Writes `sign · ∂(nᵀ μ)/∂(control points)` for the four control points of `surfel`.
@@ -95,6 +113,20 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
+        #[test]
+        fn the_distance_in_the_plane_is_measured_in_its_extents(
+            turn in prop::array::uniform3(-3.0..3.0_f64),
+            extents in prop::array::uniform2(0.01..1.0_f64),
+            apart in prop::array::uniform3(-2.0..2.0_f64),
+        ) {
+            let (R, [a, b]) = (so3::exp(&turn.into()).to_rotation_matrix(), extents);
+            let covariance = R * Matrix3::from_diagonal(&Vector3::new(1e-5, a * a, b * b)) * R.inverse();
+            let apart = Vector3::from(apart);
+            let q = distance_in_plane(&covariance, &sym3::eigen(&covariance), &(R * apart));
+            let expected = (apart.y / a).powi(2) + (apart.z / b).powi(2);
+            prop_assert!((q - expected).abs() < 1e-6 * (1.0 + expected), "{q} {expected}");
+        }
+
         /// The model is eq. 3: the correction at the surfel's own time turns its lever and moves it.
         #[test]
         fn the_jacobian_agrees_with_central_differences(scene in Scene::any(), i in 0..8_usize) {

@@ -298,6 +298,10 @@ class Surfels:
         """Unit normals (N, 3) towards the sensor, lidar frame."""
 
     @property
+    def angles(self) -> NDArray[np.float64]:
+        """Mean encoder angles (N,), rad; zero for heads without motor."""
+
+    @property
     def voxel_sizes(self) -> NDArray[np.float64]:
         """Voxel size (N,) of each surfel's level, m."""
 

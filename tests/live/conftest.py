@@ -14,6 +14,7 @@ from bentwing.estimators import Continuous
 from bentwing.estimators.settings import ContinuousSettings
 from bentwing.preprocess import preprocess
 from bentwing.recording import EncoderBatch, ImuBatch, LidarBatch, Payload, Recording
+from bentwing.recording.payload import Encoder, Transform
 from bentwing.trajectory import read_tum
 
 LENGTH = 12.0  # s; the rest at the start is over after four
@@ -97,6 +98,13 @@ def quick():
 def flight(simulated):
     """Twelve seconds of a flight."""
     return read_flight(simulated("office", 22.0))
+
+
+@pytest.fixture(scope="session")
+def turned_payload(flight):
+    """The same lidar on a motor, with the inertial sensor on the body."""
+    encoder = Encoder(T_imu_motor=Transform(), T_motor_lidar=Transform())
+    return flight.payload.model_copy(update={"encoder": encoder, "T_imu_lidar": None})
 
 
 @pytest.fixture(scope="session")

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import bentwing
+from bentwing.control.spin_target import structure_support
 from bentwing.errors import DivergedError, NotEnoughDataError, PayloadError, UsageError
 from bentwing.estimators import Continuous
 from bentwing.estimators.odometry_pass import OdometryPass
@@ -325,7 +326,13 @@ def test_a_long_rest_is_waited_out_in_bounded_memory(new):
 
 @pytest.mark.parametrize(
     "options",
-    [{"map_spacing": 0.0}, {"map_spacing": np.nan}, {"max_map_points": 0}, {"max_lag": 0}],
+    [
+        {"map_spacing": 0.0},
+        {"map_spacing": np.nan},
+        {"max_map_points": 0},
+        {"max_lag": 0},
+        {"usual_rate": 0.0},
+    ],
 )
 def test_options_out_of_range_are_refused(flight, options):
     with pytest.raises(UsageError, match=next(iter(options))):
@@ -338,3 +345,50 @@ def test_a_payload_may_be_given_as_a_file(simulated, tmp_path):
         assert odometry.status == "waiting"
     with pytest.raises(PayloadError, match="no such file"):
         bentwing.Odometry(tmp_path / "none.yaml")
+
+
+def spin_up_and_stall(feed):
+    """Feed three seconds of turning and one of standing still, as they come."""
+    for k in range(400):
+        feed(0.01 * k, 6.0 if k < 300 else 0.1)
+
+
+def test_a_stall_is_told_while_it_lasts(new):
+    odometry = new(usual_rate=6.0)
+    assert odometry.stall is None
+    spin_up_and_stall(lambda time, rate: odometry.add_imu(time, (0.0, 0.0, rate), UP))
+    assert odometry.stall.start == pytest.approx(3.0, abs=0.15)
+    assert "stalled" in odometry.stall.warning
+    for k in range(50):
+        odometry.add_imu(4.0 + 0.01 * k, (0.0, 0.0, 6.0), UP)
+    assert odometry.stall is None
+    with pytest.raises(UsageError, match="usual_rate"):
+        new().stall  # noqa: B018 - reading it is the test
+
+
+def test_an_encoder_knows_better_than_the_imu_of_a_body_that_turns(new, turned_payload):
+    odometry, angle = new(turned_payload, usual_rate=6.0), 0.0
+
+    def feed(time, rate):
+        nonlocal angle
+        angle += 0.01 * rate
+        odometry.add_encoder(time, angle)
+        odometry.add_imu(time, (0.0, 0.0, 6.0), UP)
+
+    spin_up_and_stall(feed)
+    assert odometry.stall.start == pytest.approx(3.0, abs=0.15)
+
+
+def test_the_last_window_tells_which_way_surfaces_face(flown):
+    normals = flown.odometry.surfel_normals()
+    assert np.linalg.norm(normals, axis=1) == pytest.approx(1.0, abs=1e-6)
+    # an office: walls, floor and ceiling face along three axes
+    upright = np.abs(normals[:, 2]) > 0.97
+    assert 0.1 < upright.mean() < 0.9
+    level = normals[~upright]
+    assert np.median(np.abs(level[:, 2])) < 0.05
+    assert structure_support(normals) > 0.1
+
+
+def test_without_a_window_there_are_no_normals(new):
+    assert new().surfel_normals().shape == (0, 3)

@@ -120,6 +120,12 @@ impl Surfels {
         )
     }
 
+    /// Mean encoder angles (N,), rad; zero for heads without motor.
+    #[getter]
+    fn angles<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.0.angles.to_pyarray(py)
+    }
+
     /// Voxel size of each surfel's level (N,), m.
     #[getter]
     fn voxel_sizes<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bentwing.errors import UsageError
+
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
@@ -46,14 +48,14 @@ class StallWatch:
 
     Parameters
     ----------
-    usual : rad/s, the rate that is held or commanded
+    usual_rate : rad/s, the rate that is held or commanded
     """
 
-    def __init__(self, usual: float) -> None:
-        if not (np.isfinite(usual) and usual > 0):
-            msg = f"usual: expected a rate above zero, got {usual} rad/s"
-            raise ValueError(msg)
-        self._usual = usual
+    def __init__(self, usual_rate: float) -> None:
+        if not (np.isfinite(usual_rate) and usual_rate > 0):
+            msg = f"usual_rate: expected a rate above zero, got {usual_rate} rad/s"
+            raise UsageError(msg)
+        self._usual = usual_rate
         self._recent: deque[tuple[float, float]] = deque()
         self._angle: tuple[float, float] | None = None
         self._was_turning = False

@@ -126,6 +126,23 @@ class OdometryPass:
         first: NDArray[np.float64] = self._first_position
         return first + geometry.rotate(levelling(self.globals.gravity), points - first)
 
+    def normals(self) -> NDArray[np.float64]:
+        """Return the normals (N, 3) of the last window's surfels, towards the sensor, map frame."""
+        start = self._window_start(self._end)
+        parts = [self._normals_of(s) for t, s in self._surfels if t >= start - 1e-6]
+        return np.concatenate(parts) if parts else np.empty((0, 3))
+
+    def _normals_of(self, surfels: _core.Surfels) -> NDArray[np.float64]:
+        order = np.argsort(surfels.stamps, kind="stable")
+        means, stamps = surfels.means[order], surfels.stamps[order]
+        has_motor = self.globals.motor_lidar_translation is not None
+        angles = surfels.angles[order] if has_motor else None
+        ends = [
+            self.samples.place(points, stamps, angles, self.globals, threads=self._threads)
+            for points in (means, means + surfels.normals[order])
+        ]
+        return geometry.rotate(levelling(self.globals.gravity), ends[1] - ends[0])
+
     def _levelled(
         self, start: float, positions: NDArray[np.float64], quats: NDArray[np.float64]
     ) -> Trajectory:

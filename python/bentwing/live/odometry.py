@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bentwing.control import StallWatch
 from bentwing.errors import UsageError
 from bentwing.estimators import Continuous
 from bentwing.live.backlog import Backlog
@@ -21,7 +22,7 @@ from bentwing.live.state import LiveState, Registered
 from bentwing.live.status import Status, status_of
 from bentwing.live.worker import Worker
 from bentwing.preprocess import Preprocessing
-from bentwing.recording import ImuBatch, LidarBatch, Payload
+from bentwing.recording import EncoderBatch, ImuBatch, LidarBatch, Payload
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
     from typing_extensions import Self
 
+    from bentwing.control import Stall
     from bentwing.estimators.interface import Estimate
     from bentwing.estimators.settings import ContinuousSettings
     from bentwing.recording import Batch
@@ -51,6 +53,7 @@ class Odometry:
     map_spacing : m, edge of the voxels that keep one point of the map each
     max_map_points : the map never holds more, at 20 bytes each: `map_spacing` doubles instead
     max_lag : s that registration may be late; points are thinned out before, and counted
+    usual_rate : rad/s at which the head is held or commanded; with it `stall` tells when it stands
     """
 
     def __init__(
@@ -62,6 +65,7 @@ class Odometry:
         map_spacing: float = 0.1,
         max_map_points: int = 5_000_000,
         max_lag: float = 10.0,
+        usual_rate: float | None = None,
     ) -> None:
         if not (np.isfinite(map_spacing) and map_spacing > 0):
             msg = f"map_spacing: expected a length above zero, got {map_spacing} m"
@@ -71,6 +75,7 @@ class Odometry:
             raise UsageError(msg)
         head = payload if isinstance(payload, Payload) else Payload.load(payload)
         self._payload = head
+        self._spin = None if usual_rate is None else StallWatch(usual_rate)
         self._backlog = Backlog(max_lag)
         self._dropped: Counter[str] = Counter({"live.points_dropped": 0})
         self._filtered: Counter[str] = Counter()
@@ -235,6 +240,28 @@ class Odometry:
         return status_of(self._state.newest, age, self._engine.settings.shift)
 
     @property
+    def stall(self) -> Stall | None:
+        """The stall of the head that lasts, with a warning for the pilot; None while it turns.
+
+        Seen by the encoder, or without one by an IMU that turns with the head, as soon as they are
+        fed: no registration is waited for. What a long stall may cut is two maps then, see `Estimate`.
+
+        Raises
+        ------
+        UsageError
+            Without `usual_rate`.
+        """
+        if self._spin is None:
+            msg = "a stall is told from the usual rate: Odometry(..., usual_rate=...) in rad/s"
+            raise UsageError(msg)
+        return self._spin.stall
+
+    def surfel_normals(self) -> NDArray[np.float64]:
+        """Return the normals (N, 3), map frame, of what the last window has seen, for `SpinTarget`."""
+        newest = self._state.newest
+        return np.empty((0, 3)) if newest is None else newest.done.normals()
+
+    @property
     def health(self) -> dict[str, Any] | None:
         """The record of the last window, as in `Estimate.windows`; None while waiting."""
         newest = self._state.newest
@@ -287,10 +314,19 @@ class Odometry:
         else:
             self._worker.put(batch)
         self._order.accept(batch)
+        self._watch_spin(batch)
         if isinstance(batch, ImuBatch):
             self._state.add_imu(batch)
         elif isinstance(batch, LidarBatch):
             self._newest_point = float(batch.times[-1])
+
+    def _watch_spin(self, batch: Batch) -> None:
+        if self._spin is None:
+            return
+        if isinstance(batch, EncoderBatch):
+            self._spin.add_encoder(batch.times, batch.angles)
+        elif isinstance(batch, ImuBatch) and self._payload.encoder is None:
+            self._spin.add_gyro(batch.times, batch.gyro)
 
     def _has_time(self, batch: LidarBatch) -> bool:
         self._worker.require_health()

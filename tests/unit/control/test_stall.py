@@ -3,6 +3,7 @@ import numpy as np
 import pytest
 
 from bentwing.control import StallWatch
+from bentwing.errors import UsageError
 from bentwing.inspection.spin import spin_from_gyro
 
 USUAL = 5.0
@@ -68,5 +69,5 @@ def test_samples_that_cannot_be_used_are_counted():
 
 
 def test_a_rate_of_zero_is_refused():
-    with pytest.raises(ValueError, match="usual"):
+    with pytest.raises(UsageError, match="usual_rate"):
         StallWatch(0.0)

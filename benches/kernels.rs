@@ -122,7 +122,7 @@ fn surfels(cases: &mut Cases, folder: &Path, name: &str, flight: Flight) -> Resu
     let (trajectory, head) = (&flight.trajectory, &flight.globals.head);
     let placed = place_points(&flight.points, &flight.stamps, &[], trajectory, head);
     npy::write(&folder.join("points.npy"), placed.as_flattened(), 3)?;
-    let settings = surfel_settings();
+    let settings = surfel_settings(flight.settings().range_sigma);
     let work = move || {
         let points = Points {
             points: &flight.points,

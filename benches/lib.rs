@@ -204,7 +204,7 @@ impl Flight {
                 stamps: &self.stamps[part],
                 angles: &[],
             };
-            let settings = surfel_settings();
+            let settings = surfel_settings(self.scanner.sigma());
             Arc::new(bentwing_surfels::extract(
                 points,
                 &self.trajectory,
@@ -251,7 +251,7 @@ pub fn one_thread() -> rayon::ThreadPool {
 }
 
 /// The estimator's defaults.
-pub fn surfel_settings() -> Surfels {
+pub fn surfel_settings(range_sigma: f64) -> Surfels {
     Surfels {
         voxel_size: 0.4,
         n_levels: 4,
@@ -263,6 +263,7 @@ pub fn surfel_settings() -> Surfels {
         min_width: 0.05,
         min_incidence_cosine: 0.1,
         max_rate: 4000.0,
+        range_sigma,
     }
 }
 

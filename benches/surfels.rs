@@ -11,7 +11,7 @@ fn extraction(c: &mut Criterion) {
     let mut group = c.benchmark_group("surfels");
     for (name, scanner) in [("hokuyo_1s", Scanner::Hokuyo), ("vlp16_1s", Scanner::Vlp16)] {
         let flight = scanner.fly(1.0);
-        let settings = surfel_settings();
+        let settings = surfel_settings(scanner.sigma());
         group.throughput(Throughput::Elements(flight.points.len() as u64));
         group.bench_function(name, |b| {
             b.iter(|| {

@@ -313,6 +313,7 @@ def extract_surfels(
     globals: Globals,
     *,
     settings: SurfelSettings,
+    range_sigma: float,
     threads: int = 0,
 ) -> Surfels:
     """Extract surfels from lidar points placed with `samples` (Kaul 2015, section 2.1).
@@ -320,6 +321,7 @@ def extract_surfels(
     Parameters
     ----------
     points, stamps, angles, globals : as in `Samples.place`
+    range_sigma : m, of one range; its part is taken out of the surfels' covariances
     """
 
 @final

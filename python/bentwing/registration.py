@@ -113,7 +113,14 @@ def register_window(
         msg = "times: expected at least one, and all within the prior trajectory"
         raise ValueError(msg)
     surfels = _core.extract_surfels(
-        points, times, angles, samples, slow, settings=settings.surfels, threads=n_threads
+        points,
+        times,
+        angles,
+        samples,
+        slow,
+        settings=settings.surfels,
+        range_sigma=payload.lidar.range_sigma,
+        threads=n_threads,
     )
     known = SlowStatePrior(
         None if imu is None else payload.imu,

@@ -122,6 +122,7 @@ def extract(flight, samples):
             "samples": samples,
             "globals": make_globals(),
             "settings": SurfelSettings(),
+            "range_sigma": 0.01,
         }
         return _core.extract_surfels(**{**values, **changed})
 

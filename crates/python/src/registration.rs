@@ -139,7 +139,7 @@ impl Surfels {
 
 /// Extracts surfels from lidar points placed with `samples`.
 #[pyfunction]
-#[pyo3(signature = (points, stamps, angles, samples, globals, *, settings, threads = 0))]
+#[pyo3(signature = (points, stamps, angles, samples, globals, *, settings, range_sigma, threads = 0))]
 #[allow(clippy::too_many_arguments, reason = "the arrays of a batch")]
 pub(crate) fn extract_surfels(
     py: Python<'_>,
@@ -149,12 +149,17 @@ pub(crate) fn extract_surfels(
     samples: &Samples,
     globals: &Globals,
     settings: SurfelSettings,
+    range_sigma: f64,
     threads: usize,
 ) -> PyResult<Surfels> {
     let points = finite_rows("points", &points)?;
     let stamps = times("stamps", &stamps, points.len())?;
     let has_motor = globals.0.head.motor.is_some();
     let angles = angles_of(angles.as_ref(), points.len(), has_motor)?;
+    if !(range_sigma.is_finite() && range_sigma >= 0.0) {
+        let message = format!("range_sigma: expected zero or more, got {range_sigma} m");
+        return Err(PyValueError::new_err(message));
+    }
     let settings = bentwing_surfels::Settings {
         voxel_size: settings.voxel_size,
         n_levels: settings.n_levels,
@@ -166,6 +171,7 @@ pub(crate) fn extract_surfels(
         min_width: settings.min_width,
         min_incidence_cosine: settings.min_incidence_cosine,
         max_rate: settings.max_rate,
+        range_sigma,
     };
     let points = Points {
         points,

@@ -7,7 +7,7 @@
 )]
 
 use bentwing_trajectory::{Head, Trajectory};
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 use pulp::{Arch, Simd, WithSimd};
 use rustc_hash::FxHashMap;
 
@@ -53,6 +53,8 @@ pub struct Settings {
     pub min_incidence_cosine: f64,
     /// Most surfels per second of data.
     pub max_rate: f64,
+    /// Standard deviation of a range, m.
+    pub range_sigma: f64,
 }
 
 /// Time-stamped points of the lidar.
@@ -291,20 +293,42 @@ fn push_surfel(
     let R_lidar_map = (pose.R * R_imu_lidar).transpose();
     let t_map_lidar = pose.p + pose.R * t_imu_lidar;
     let mean = R_lidar_map * (moments.mean() + origin - t_map_lidar);
-    let normal = R_lidar_map * eigen.normal;
+    let seen = R_lidar_map * covariance * R_lidar_map.transpose();
+    let covariance = without_range_noise(&seen, &mean, settings.range_sigma);
+    let normal = sym3::eigen(&covariance).normal;
     let away = normal.dot(&mean);
     if away.abs() < settings.min_incidence_cosine * mean.norm() {
         return false;
     }
     set.means.push(mean);
-    set.covariances
-        .push(R_lidar_map * covariance * R_lidar_map.transpose());
+    set.covariances.push(covariance);
     // Turned to the sensor: otherwise thin walls match front to back.
     set.normals.push(if away > 0.0 { -normal } else { normal });
     set.stamps.push(stamp);
     set.angles.push(angle);
     set.n_points.push(moments.n());
     true
+}
+
+/// Share of the spread along the ray that is left at least.
+const LEFT: f64 = 0.1;
+
+/// Takes the noise of the ranges, which spreads points along their rays, out of a covariance.
+///
+/// It is no roughness, and where a surface is seen at a grazing angle it turns the normal, always
+/// to the same side: a sensor that climbs would see the ground move with it.
+fn without_range_noise(
+    covariance: &Matrix3<f64>,
+    mean: &Vector3<f64>,
+    range_sigma: f64,
+) -> Matrix3<f64> {
+    let (ray, Some(inverse)) = (mean.normalize(), covariance.try_inverse()) else {
+        return *covariance;
+    };
+    // More than this along the ray, and the rest is no covariance.
+    let most = 1.0 / ray.dot(&(inverse * ray));
+    let noise = (range_sigma * range_sigma).min((1.0 - LEFT) * most);
+    covariance - ray * ray.transpose() * noise.max(0.0)
 }
 
 /// Packs the voxel coordinates of each point into a key.

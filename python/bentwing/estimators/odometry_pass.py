@@ -175,6 +175,7 @@ class OdometryPass:
             self.samples,
             self.globals,
             settings=self._settings.surfels,
+            range_sigma=self._core.range_sigma,
             threads=self._threads,
         )
 

@@ -17,6 +17,7 @@ fn settings() -> Settings {
         min_width: 0.05,
         min_incidence_cosine: 0.1,
         max_rate: f64::INFINITY,
+        range_sigma: 0.0,
     }
 }
 
@@ -200,4 +201,52 @@ fn a_budget_keeps_the_same_voxels_of_a_surface_seen_twice() {
     );
     assert!(few.len() <= 40 && few.len() < all.len() && fewer.len() < few.len());
     assert!(fewer.means.iter().all(|m| few.means.contains(m)));
+}
+
+/// Pseudo-random normal numbers: sums of twelve uniform ones.
+fn noise(i: u64) -> f64 {
+    let uniform = |k| (rank(12 * i + k, 0) >> 11) as f64 / (1u64 << 53) as f64;
+    (0..12).map(uniform).sum::<f64>() - 6.0
+}
+
+/// Lines farther apart than the noise: seen at a grazing angle it tilts every normal to one side.
+#[test]
+fn noise_along_the_rays_does_not_tilt_the_ground() -> Result<(), TrajectoryError> {
+    let above = vec![Vector3::new(0.0, 0.0, 1.5); 121];
+    let level = vec![nalgebra::UnitQuaternion::identity(); 121];
+    let trajectory = Trajectory::new(-0.05, 0.01, above, level)?;
+    let head = Head {
+        T_imu_base: Isometry3::identity(),
+        ..head()
+    };
+    let sigma = 0.03;
+    let ground = |i: u64| {
+        let (line, column) = (i / 400, i % 400);
+        let p = Vector3::new(4.0 + 0.16 * line as f64, 0.01 * column as f64 - 2.0, -1.5);
+        (p + p.normalize() * sigma * noise(i)).into()
+    };
+    let points: Vec<[f64; 3]> = (0..10_000).map(ground).collect();
+    let stamps: Vec<f64> = (0..10_000).map(|i| 0.1 + 2e-5 * f64::from(i)).collect();
+    let tilt = |range_sigma| {
+        let points = Points {
+            points: &points,
+            stamps: &stamps,
+            angles: &[],
+        };
+        let settings = Settings {
+            range_sigma,
+            ..settings()
+        };
+        let set = extract(points, &trajectory, &head, &settings);
+        assert!(set.len() > 100);
+        set.normals.iter().map(|n| n.x).sum::<f64>() / set.len() as f64
+    };
+    assert!(tilt(0.0) > 5e-3, "{}", tilt(0.0));
+    assert!(
+        tilt(sigma).abs() < 0.2 * tilt(0.0),
+        "{} {}",
+        tilt(sigma),
+        tilt(0.0)
+    );
+    Ok(())
 }

@@ -252,13 +252,19 @@ def test_results_own_their_memory(samples):
     assert samples.positions.any()
 
 
+@pytest.mark.parametrize("sigma", [np.nan, -0.01, np.inf])
+def test_the_noise_of_ranges_must_be_a_length(extract, sigma):
+    with pytest.raises(ValueError, match="range_sigma"):
+        extract(range_sigma=sigma)
+
+
 def test_no_argument_is_forgotten():
     """Every array in the signatures of the core is in the table above."""
     documented = SimpleNamespace(
         scene=_core.Scene, imu=_core.Imu, samples=_core.Samples, place=_core.Samples.place,
         extract_surfels=_core.extract_surfels,
     )  # fmt: skip
-    others = {"start", "dt", "samples", "globals", "settings", "threads", "self"}
+    others = {"start", "dt", "samples", "globals", "settings", "range_sigma", "threads", "self"}
     for call, function in vars(documented).items():
         names = set(re.findall(r"[\w$]+", function.__text_signature__)) - {"None", "0"} - others
         assert names - {"$self"} == {a.name for a in ARGUMENTS if a.call == call}

@@ -50,6 +50,11 @@ $(CORE): $(VENV)/.tools $(CORE_SOURCES)
 .PHONY: setup
 setup: $(VENV)/.tools ## make .venv and install the developer's tools
 
+.PHONY: browser
+browser: ## a Chromium for the tests that open the report, where Debian's packages can be installed
+	@command -v chromium >/dev/null || (apt-get update -qq && apt-get install -y -qq --no-install-recommends chromium) || \
+		echo "no Chromium: the tests that open the report are skipped"
+
 .PHONY: build
 build: setup ## compile the core (release) and install the package in place
 	$(BIN)/maturin develop --release

@@ -13,6 +13,7 @@ from bentwing.atomic import write_text
 from bentwing.report import sections
 from bentwing.report.calibration import calibration_table
 from bentwing.report.plot import Series, line_plot
+from bentwing.report.scene import scene
 from bentwing.report.views import SLAB, draw_views
 
 if TYPE_CHECKING:
@@ -50,7 +51,7 @@ def write_report(
         _header(title, run_json),
         sections.verdict(run_json),
         sections.tiles(run_json, trajectory, points),
-        _maps(points, times, trajectory),
+        _maps(points, times, trajectory, run_json.get("windows") or []),
         _motion(trajectory, spin),
         _windows(run_json.get("windows") or []),
         f"<h2>Calibration of the sensor head</h2>{calibration_table(run_json.get('calibration'))}",
@@ -78,11 +79,17 @@ def _header(title: str, record: Mapping[str, Any]) -> str:
     return f"<header><h1>{escape(title)}</h1><p>bentwing {escape(version)} · {escape(started)}</p></header>"
 
 
-def _maps(points: NDArray[np.float64], times: NDArray[np.float64], trajectory: Trajectory) -> str:
+def _maps(
+    points: NDArray[np.float64],
+    times: NDArray[np.float64],
+    trajectory: Trajectory,
+    windows: Sequence[Mapping[str, Any]],
+) -> str:
     if not len(points):
         return '<h2>Map</h2><p class="none">No points were mapped.</p>'
     views = draw_views(points, times, trajectory)
     figures = [
+        scene(points, times, trajectory, windows),
         _figure(views.oblique, "Oblique view", "coloured by height", wide=True),
         _figure(views.plan_height, "Plan", f"by height, with the path of the sensor (circle: start). {views.plan_note}"),
         _figure(views.plan_time, "Plan by time", "colours side by side that differ strongly are places seen again later; doubled walls there would be drift."),

@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+import base64
+import json
+import re
+
+import numpy as np
+import pytest
+
+from bentwing.report import scene as rooms
+from bentwing.report.scene import degenerate, scene
+from bentwing.trajectory import Trajectory
+
+WINDOWS = [{"time": t, "degenerate": t == 3.0} for t in (1.0, 2.0, 3.0, 4.0)]
+
+
+def path(n=50):
+    times = np.linspace(0.0, 4.0, n)
+    positions = np.column_stack([times, np.sin(times), np.full(n, 1.5)])
+    return Trajectory(times, positions, np.tile([0.0, 0.0, 0.0, 1.0], (n, 1)))
+
+
+def data_of(html):
+    return json.loads(re.search(r'<script type="application/json">(.*?)</script>', html)[1])
+
+
+def decoded(text, dtype):
+    return np.frombuffer(base64.b64decode(text), dtype)
+
+
+def test_points_and_path_are_kept_to_a_step():
+    rng = np.random.default_rng(0)
+    points, times = rng.uniform([-5, 0, -1], [15, 8, 4], (5000, 3)), np.linspace(0, 4, 5000)
+    data = data_of(scene(points, times, path(), WINDOWS))
+    origin, step = np.array(data["origin"]), data["step"]
+    shown = origin + step * decoded(data["points"], "<u2").reshape(-1, 3)
+    assert step < 20.0 / 60_000
+    assert len(shown) > 0.99 * len(points)
+    nearest = np.abs(shown[::500, None] - points[None]).max(axis=2).min(axis=1)
+    assert nearest.max() <= 0.51 * step
+    way = origin + step * decoded(data["path"], "<u2").reshape(-1, 3)
+    assert np.abs(way - path().positions).max() <= 0.51 * step
+    ages = decoded(data["times"], np.uint8)
+    assert (ages[0], ages[-1]) == (0, 255)
+
+
+def test_the_path_is_marked_where_a_direction_was_unseen():
+    found = degenerate(np.array([0.5, 1.5, 2.1, 2.9, 3.0, 3.5, 9.0]), WINDOWS)
+    assert found.tolist() == [False, False, True, True, True, False, False]
+    assert not degenerate(np.array([1.0]), []).any()
+
+
+def test_many_points_are_thinned(monkeypatch):
+    monkeypatch.setattr(rooms, "N_POINTS", 100)
+    points = np.random.default_rng(1).uniform(0, 1, (1001, 3))
+    data = data_of(scene(points, np.arange(1001.0), path()))
+    assert 80 <= len(decoded(data["times"], np.uint8)) <= 100
+
+
+@pytest.mark.parametrize("n", [1, 2])
+def test_hardly_any_points_make_a_scene(n):
+    empty = Trajectory(np.empty(0), np.empty((0, 3)), np.empty((0, 4)))
+    data = data_of(scene(np.ones((n, 3)), np.zeros(n), empty))
+    assert data["radius"] > 0
+    assert data["path"] == ""

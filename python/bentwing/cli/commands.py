@@ -19,6 +19,7 @@ COMMANDS = {
         "evaluate_command",
         "Measure the errors of a trajectory and a map.",
     ),
+    "view": ("view", "view_command", "Show a run: map, path and windows over time."),
     "simulate": ("simulate", "simulate_command", "Simulate a recording with truth."),
     "reproduce": ("reproduce", "reproduce_command", "Make a paper's figures and tables again."),
 }

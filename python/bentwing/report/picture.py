@@ -12,6 +12,7 @@ import numpy as np
 
 from bentwing.atomic import write_bytes
 from bentwing.report.colours import HEIGHT, colour
+from bentwing.report.occlusion import ambient
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -22,6 +23,7 @@ _Scalar = TypeVar("_Scalar", bound=np.generic)
 
 PAPER = 255  # brightness where there is no point
 _ENCLOSED = 3  # filled neighbours of eight
+_DARKEST = np.float32(0.3)  # of ambient light that is left where none comes in
 _RADII = (1, 3)  # pixels over which depth is compared
 _OUTLIERS = 0.1  # percent of the points on each side that may fall off the picture
 _SLACK = 0.25  # of the extent without outliers that they may add on each side
@@ -57,7 +59,7 @@ class Projection:
     Attributes
     ----------
     front : (H, W) intp, index of the point nearest to the viewer, -1 where there is none
-    light : (H, W) float32, brightness, see `_eye_dome`
+    light : (H, W) float32, brightness, see `_eye_dome` and `ambient`
     pixel, left, top : as of a `View`
     """
 
@@ -113,7 +115,9 @@ def project(
     depth[seen] = (nearest - nearest[:1]) / pixel
     for _ in range(close_gaps):
         _close_gaps(depth, front)
-    return Projection(front, _eye_dome(depth), pixel, left, top)
+    return Projection(
+        front, _eye_dome(depth) * (_DARKEST + (1 - _DARKEST) * ambient(depth)), pixel, left, top
+    )
 
 
 def paint(
@@ -131,7 +135,7 @@ def paint(
     seen : the projection of N points
     values : (N,) what the colour shows
     table : colour map
-    shading : 0 for flat colours, 1 for full eye-dome lighting
+    shading : 0 for flat colours, 1 for full eye-dome lighting and ambient occlusion
     span : values at the ends of the colour map; default: of the central 98 %
     """
     if span is None:

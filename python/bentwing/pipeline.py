@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bentwing import estimators
+from bentwing.checkpoint import Checkpoint
 from bentwing.errors import EstimationError
 from bentwing.map.project import project
 from bentwing.map.sample import MapSample
@@ -45,6 +46,7 @@ def map_recording(
     threads: int | None = None,
     start: float | None = None,
     duration: float | None = None,
+    resume: bool = False,
     progress: Progress | None = None,
 ) -> Run:
     """Turn a recording into a trajectory, a map and a report in a folder.
@@ -61,6 +63,7 @@ def map_recording(
     settings : of the estimator; default: its defaults
     threads : of the estimator; default: all cores
     start, duration : s, the part of the recording to use; default: all of it
+    resume : go on behind the last stage that an earlier run in `out` has finished, if there is one
     progress : what to tell the user meanwhile; default: nothing
 
     Raises
@@ -89,13 +92,18 @@ def map_recording(
             with folder.stage("inputs"):
                 described = [Path(payload)] if isinstance(payload, (str, Path)) else []
                 folder.add_inputs([*recording.paths, *described])
-            with folder.stage("estimate"), watch.stage("estimate", part.length) as shown:
-                _estimate(engine, part, shown, folder, run)
+            checkpoint = Checkpoint(folder)
+            done = checkpoint.restore(run) if resume else None
+            if done is None:
+                with folder.stage("estimate"), watch.stage("estimate", part.length) as shown:
+                    _estimate(engine, part, shown, folder, run)
+                checkpoint.save("estimate", run)
             with folder.stage("map"), watch.stage("map", part.length) as shown:
                 _write_map(run, part, shown, folder, asked)
             with folder.stage("report"):
                 folder.save()
                 report_run(folder, run, complete=True)
+            checkpoint.discard()
     return run
 
 

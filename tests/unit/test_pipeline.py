@@ -141,7 +141,7 @@ def test_an_interrupt_while_mapping_leaves_the_trajectory_and_no_half_map(
         pipeline.map_recording(recording, PAYLOAD, tmp_path / "out")
     record = record_of(tmp_path / "out")
     assert (record["stage"], record["reason"]) == ("map", "interrupted")
-    assert record["files"] == ["odometry.txt", "trajectory.txt", "report.html"]
+    assert record["files"] == ["odometry.txt", "trajectory.txt", "checkpoint.npz", "report.html"]
     assert {f.name for f in (tmp_path / "out").iterdir()} == {*record["files"], "run.json"}
 
 

@@ -35,6 +35,9 @@ def map_command(
     duration: Annotated[
         float | None, typer.Option(help="Seconds of the recording to use.", min=0)
     ] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on with the run in OUT that was killed.")
+    ] = False,
     quiet: Annotated[bool, typer.Option("--quiet", help="Say nothing but errors.")] = False,
     print_settings: Annotated[
         bool, typer.Option("--print-settings", help="Show the settings and stop.")
@@ -64,6 +67,7 @@ def map_command(
         threads=threads,
         start=start,
         duration=duration,
+        resume=resume,
         progress=create_progress(quiet=quiet),
     )
     if not quiet:

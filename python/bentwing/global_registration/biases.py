@@ -25,9 +25,7 @@ def has_inertial_states(estimate: Estimate) -> bool:
     return "gyro_bias" in estimate.calibration.std
 
 
-def drift_of(
-    estimate: Estimate, name: str, times: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def drift_of(estimate: Estimate, name: str, times: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return how far a bias was at `times` (M,) from its value in the calibration (M, 3).
 
     Parameters

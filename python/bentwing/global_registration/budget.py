@@ -87,7 +87,8 @@ def _fixed(seconds: float, settings: GlobalSettings) -> float:
     stretches = seconds / settings.stretch
     # Control points of a stretch; each visit joins all of one with all of the other.
     controls = settings.stretch / settings.interval_for(seconds) + 4
-    blocks = stretches * (1 + settings.n_visits) * controls**2
+    # No more than there are pairs of control points.
+    blocks = min(stretches * (1 + settings.n_visits) * controls**2, (n / 6) ** 2 / 2)
     held = min(HELD, stretches) * settings.stretch * settings.surfels.max_rate * PLACED
     inertial = 100 * seconds * 8 * (2 * 7 * 4 + 7)
     return BLOCK * blocks + 8 * FACTOR_SHARE * n**2 + held + inertial

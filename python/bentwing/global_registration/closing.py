@@ -78,10 +78,14 @@ def close_loops(
     )
     collected = time.perf_counter()
     record: dict[str, Any] = {"applied": False, "budget": budget}
+    if not any(p.surfels for p in pieces):
+        return _unchanged(estimate, record, "there are no points along the trajectory")
     try:
         found = _core.register_globally(
             [_piece(p, inertial, estimate, payload) for p in pieces],
-            settings=CoreSettings.of(settings.registration(budget.seconds), payload, interval_of(estimate)),
+            settings=CoreSettings.of(
+                settings.registration(budget.seconds), payload, interval_of(estimate)
+            ),
             plan=MatchingPlan(settings.n_visits, settings.min_overlap, HELD),
             threads=threads or 0,
         )

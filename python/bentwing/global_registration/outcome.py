@@ -27,6 +27,8 @@ TOLERATED_LOSS = 0.01
 
 def improved(found: _core.GlobalRegistration) -> str:
     """Return why a result cannot be trusted, or nothing."""
+    if not any(i[0] for i in found.iterations):
+        return "no surface was seen twice"
     if not found.converged:
         turn, shift = found.iterations[-1][4:]
         return (
@@ -74,7 +76,14 @@ def record_of(
 ) -> dict[str, Any]:
     """Return what was done, for run.json; lengths in m, angles in rad, times in s."""
     n_unknowns, n_links, n_far_links, n_surfels = found.counts
-    names = ("n_matches", "n_far_matches", "inlier_share", "residual_rms", "rotation", "translation")
+    names = (
+        "n_matches",
+        "n_far_matches",
+        "inlier_share",
+        "residual_rms",
+        "rotation",
+        "translation",
+    )
     pairs = list(zip(segments, found.samples, strict=True))
     shifts = [np.linalg.norm(n.positions - s.positions, axis=1).max() for s, n in pairs]
     turns = [_turns(s.quats_xyzw, n.quats_xyzw).max() for s, n in pairs]

@@ -14,7 +14,9 @@ class GlobalSettings(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     knot_interval: float = Field(
-        1.0, gt=0, description="of the correction spline, s; what is faster the windows have settled"
+        1.0,
+        gt=0,
+        description="of the correction spline, s; what is faster the windows have settled",
     )
     max_knots: int = Field(1000, ge=4, description="of all together; a longer interval keeps to it")
     stretch: float = Field(5.0, gt=0, description="what is matched as one visit of a place, s")

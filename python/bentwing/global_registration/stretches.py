@@ -11,7 +11,6 @@ import numpy as np
 from bentwing import _core
 from bentwing.estimators.core_states import core_globals, core_samples
 from bentwing.recording import ImuBatch, LidarBatch
-from bentwing.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -21,6 +20,7 @@ if TYPE_CHECKING:
     from bentwing.estimators.interface import Estimate
     from bentwing.estimators.settings import SurfelSettings
     from bentwing.recording import Batch
+    from bentwing.trajectory import Trajectory
 
 
 @dataclass(slots=True)

@@ -164,7 +164,7 @@ pub fn register_globally(
     let covariances: Vec<_> = (0..states.len()).map(covariance).collect();
     let pieces = states.into_iter().zip(covariances);
     Ok(GlobalRegistration {
-        pieces: pieces.map(|(s, c)| s.finish(c)).collect(),
+        pieces: pieces.map(|(s, c)| s.finish(&c)).collect(),
         iterations,
         health,
         counts,

@@ -76,11 +76,11 @@ impl<'a> PieceState<'a> {
         Ok(size)
     }
 
-    pub fn finish(self, covariance: GlobalMatrix) -> PieceResult {
+    pub fn finish(self, covariance: &GlobalMatrix) -> PieceResult {
         PieceResult {
             trajectory: self.trajectory,
             globals: self.globals,
-            covariance,
+            covariance: *covariance,
             n_blind: self.n_blind,
         }
     }

@@ -16,16 +16,19 @@ from numpy.typing import NDArray
 
 from bentwing.estimators.core_settings import CoreSettings
 from bentwing.estimators.settings import SurfelSettings
+from bentwing.global_registration.matching import MatchingPlan
 from bentwing.pose_graph.graph import GravityTerms, Links
 from bentwing.pose_graph.solve import SolveSettings
 
 __all__ = [
     "FixedView",
+    "GlobalRegistration",
     "Globals",
     "Imu",
     "LazCompressor",
     "NdtReference",
     "NdtRegistration",
+    "Piece",
     "PoseGraphSolution",
     "Registration",
     "Samples",
@@ -33,6 +36,7 @@ __all__ = [
     "Surfels",
     "__version__",
     "extract_surfels",
+    "register_globally",
     "register_window",
     "solve_pose_graph",
     "thin_points",
@@ -402,6 +406,98 @@ class Registration:
     @property
     def n_blind(self) -> int:
         """Samples of the trajectory without inertial data."""
+
+@final
+class Piece:
+    """A trajectory without a break, with what was measured along it.
+
+    Parameters
+    ----------
+    samples : trajectory to start from
+    surfels : of consecutive stretches of some seconds, in order of time
+    imu : its inertial samples, less the history of their biases; None for a lidar alone
+    information : (20, 20) float64 about the prior's mean of the slow states
+    offset : (20,) correction that leads from that mean to `globals`
+    frozen : (20) slow states that are not estimated
+    """
+
+    def __new__(
+        cls,
+        samples: Samples,
+        surfels: Sequence[Surfels],
+        imu: Imu | None,
+        globals: Globals,
+        *,
+        information: NDArray[np.float64],
+        offset: Sequence[float],
+        frozen: Sequence[bool],
+    ) -> Piece: ...
+
+@final
+class GlobalRegistration:
+    """Result of a global registration; lists are in the order of the pieces."""
+
+    @property
+    def samples(self) -> list[Samples]:
+        """Corrected trajectories."""
+
+    @property
+    def globals(self) -> list[Globals]:
+        """Corrected slow states."""
+
+    @property
+    def covariances(self) -> list[NDArray[np.float64]]:
+        """Covariances (20, 20) of the slow states; zero where frozen."""
+
+    @property
+    def iterations(self) -> list[tuple[int, int, float, float, float, float]]:
+        """What the matches of each iteration said before its step, and the step.
+
+        Matches, those between stretches that do not follow each other, share of inliers, weighted
+        root mean square in standard deviations, largest rotation, rad, and translation, m.
+        """
+
+    @property
+    def fit(self) -> tuple[float, float]:
+        """Share of inliers and weighted root mean square of the final matches."""
+
+    @property
+    def counts(self) -> tuple[int, int, int, int]:
+        """Unknowns, pairs of stretches, those that do not follow each other, surfels."""
+
+    @property
+    def converged(self) -> bool:
+        """Whether the last step was below the thresholds."""
+
+    @property
+    def n_blind(self) -> int:
+        """Samples of the trajectories without inertial data."""
+
+def register_globally(
+    pieces: Sequence[Piece],
+    *,
+    settings: CoreSettings,
+    plan: MatchingPlan,
+    threads: int = 0,
+) -> GlobalRegistration:
+    """Correct whole trajectories and their slow states by everything that was seen more than once.
+
+    The first piece defines the map: its first position and heading stay, and without an IMU its
+    first attitude.
+
+    Parameters
+    ----------
+    pieces : roughly aligned with each other
+    plan : which stretches are matched with which
+
+    Raises
+    ------
+    SingularSystemError, DivergedError
+
+    References
+    ----------
+    Kaul 2015, section 2.2
+    """
 
 def register_window(
     samples: Samples,

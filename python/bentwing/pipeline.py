@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from bentwing import estimators
 from bentwing.checkpoint import Checkpoint
 from bentwing.errors import EstimationError
+from bentwing.global_registration import Budget, GlobalSettings, close_loops
 from bentwing.map.project import project
 from bentwing.map.sample import MapSample
 from bentwing.map.thin import thin
@@ -21,6 +22,7 @@ from bentwing.recording import Recording
 from bentwing.report import report_run
 from bentwing.run import Run
 from bentwing.run_folder import RunFolder
+from bentwing.run_record import plain
 from bentwing.run_settings import described_settings, load_payload
 
 if TYPE_CHECKING:
@@ -29,8 +31,6 @@ if TYPE_CHECKING:
     from bentwing.estimators.interface import Estimator
     from bentwing.progress import Stage
     from bentwing.recording import Payload
-
-_NO_LOOP_CLOSURE = "not in this version, the trajectory is open-loop"
 
 
 def map_recording(
@@ -79,7 +79,7 @@ def map_recording(
         "estimator": estimator,
         "map_format": map_format,
         "map_spacing": map_spacing,
-        "loop_closure": _NO_LOOP_CLOSURE if loop_closure else False,
+        "loop_closure": plain(GlobalSettings()) if loop_closure else False,
         "threads": threads,
         "start": start,
         "duration": duration,
@@ -98,6 +98,9 @@ def map_recording(
                 with folder.stage("estimate"), watch.stage("estimate", part.length) as shown:
                     _estimate(engine, part, shown, folder, run)
                 checkpoint.save("estimate", run)
+            if loop_closure and done != "loops":
+                _close_loops(run, part, watch, folder, threads)
+                checkpoint.save("loops", run)
             with folder.stage("map"), watch.stage("map", part.length) as shown:
                 _write_map(run, part, shown, folder, asked)
             with folder.stage("report"):
@@ -128,6 +131,25 @@ def _estimate(
             folder.add_estimate(run.estimate)
             folder.write_trajectory("odometry.txt", run.estimate, origin_ns)
     folder.write_trajectory("trajectory.txt", run.estimate, origin_ns)
+
+
+def _close_loops(
+    run: Run, part: RecordingPart, watch: Progress, folder: RunFolder, threads: int | None
+) -> None:
+    if run.estimate is None:
+        return
+    settings = GlobalSettings()
+    budget = Budget.of(part.length, settings)
+    watch.note(f"loops: {budget.sentence()}")
+    with folder.stage("loops"), watch.stage("loops", part.length) as shown:
+        batches = part.batches(shown, Counter())  # what is dropped was counted in the first pass
+        closed = close_loops(
+            run.estimate, batches, part.payload, settings=settings, budget=budget, threads=threads
+        )
+    run.estimate = closed.estimate
+    folder.record["loop_closure"] = closed.record
+    folder.add_estimate(run.estimate)
+    folder.write_trajectory("trajectory.txt", run.estimate, part.recording.clock.start_ns)
 
 
 def _write_map(

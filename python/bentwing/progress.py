@@ -41,6 +41,10 @@ class Progress:
         del name, total, unit
         yield _Silent()
 
+    def note(self, text: str) -> None:
+        """Say something that is worth knowing before a stage begins."""
+        del text
+
 
 class LineProgress(Progress):
     """Plain lines, for logs and pipes: at most one every few seconds, and one at the end."""
@@ -61,6 +65,10 @@ class LineProgress(Progress):
         lines = _Lines(self._print, name, total, unit, self._clock, self._interval)
         yield lines
         lines.finish()
+
+    def note(self, text: str) -> None:
+        """Print a line."""
+        self._print(text)
 
     def _print(self, line: str) -> None:
         print(line, file=self._stream or sys.stderr, flush=True)
@@ -104,6 +112,10 @@ class BarProgress(Progress):
 
             yield _Bar()
             bars.update(task, total=done, completed=done)
+
+    def note(self, text: str) -> None:
+        """Print a line between the bars."""
+        print(text, file=sys.stderr, flush=True)
 
 
 def create_progress(*, quiet: bool = False) -> Progress:

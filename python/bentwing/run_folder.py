@@ -65,6 +65,7 @@ class RunFolder:
             "timings": {},
             "warnings": [],
             "calibration": None,
+            "loop_closure": None,
             "segments": [],
             "windows": [],
             "peak_memory_mb": None,

@@ -18,6 +18,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from bentwing.evaluate.trajectory import absolute_error
+from bentwing.trajectory import read_tum
+
 RANGE_SIGMA = 0.01  # m
 FLIGHTS = [("courtyard", 30.0), ("office", 30.0)]
 SEEDS = [1, 2, 3]
@@ -112,3 +115,13 @@ def test_a_minute_in_flight_with_a_multi_beam_scanner(flown, scene, head, seed):
     assert score.map_ratio < 1.2
     assert score.horizontal < 1.2e-3
     assert score.vertical < 1e-3
+
+
+def test_closing_the_loops_improves_a_flight_that_comes_back(flown):
+    flight = flown("cave", 40, seed=23)
+    truth, origin_ns = read_tum(flight.recording / "truth_trajectory.txt")
+    odometry, _ = read_tum(flight.out / "odometry.txt", origin_ns)
+    open_loop = absolute_error(odometry, truth).position.rmse
+    assert flight.record["loop_closure"]["applied"]
+    assert flight.score.ate < open_loop
+    assert flight.score.ate < 0.004

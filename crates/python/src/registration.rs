@@ -78,7 +78,7 @@ impl From<RegistrationSettings> for core::Settings {
 
 /// Surfels of a stretch of time, in the lidar frame at their mean stamps.
 #[pyclass(frozen, module = "bentwing._core")]
-pub(crate) struct Surfels(Arc<SurfelSet>);
+pub(crate) struct Surfels(pub(crate) Arc<SurfelSet>);
 
 #[pymethods]
 impl Surfels {
@@ -325,6 +325,22 @@ fn eigenvalues(sum: &Matrix3<f64>, weight: f64) -> [f64; 3] {
     bentwing_surfels::sym3::eigen(&(sum / weight.max(f64::MIN_POSITIVE))).values
 }
 
+/// A finite (20, 20) array as a matrix over the slow states.
+pub(crate) fn global_matrix(
+    name: &str,
+    array: &PyReadonlyArray2<'_, f64>,
+) -> PyResult<core::GlobalMatrix> {
+    let rows: &[[f64; N_GLOBALS]] = finite_rows(name, array)?;
+    if rows.len() != N_GLOBALS {
+        let message = format!(
+            "{name}: expected shape ({N_GLOBALS}, {N_GLOBALS}), got ({}, {N_GLOBALS})",
+            rows.len()
+        );
+        return Err(PyValueError::new_err(message));
+    }
+    Ok(core::GlobalMatrix::from_fn(|r, c| rows[r][c]))
+}
+
 /// Corrects `samples` and `globals` by surfel matches and inertial samples.
 #[pyfunction]
 #[pyo3(signature = (
@@ -346,15 +362,7 @@ pub(crate) fn register_window(
     settings: RegistrationSettings,
     threads: usize,
 ) -> PyResult<Registration> {
-    let rows: &[[f64; N_GLOBALS]] = finite_rows("information", &information)?;
-    if rows.len() != N_GLOBALS {
-        let message = format!(
-            "information: expected shape ({N_GLOBALS}, {N_GLOBALS}), got ({}, {N_GLOBALS})",
-            rows.len()
-        );
-        return Err(PyValueError::new_err(message));
-    }
-    let information = core::GlobalMatrix::from_fn(|r, c| rows[r][c]);
+    let information = global_matrix("information", &information)?;
     let sets: Vec<Arc<SurfelSet>> = surfels.iter().map(|s| Arc::clone(&s.0)).collect();
     let views: Vec<&RustView> = views.iter().map(|v| &v.0).collect();
     let imu = imu.map(|imu| &imu.0);

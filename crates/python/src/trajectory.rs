@@ -24,7 +24,7 @@ pub(crate) struct Samples(pub(crate) Trajectory, pub(crate) Vec<PoseResponse>);
 
 impl Samples {
     /// Poses that nothing but a registration moves.
-    fn unmoved(trajectory: Trajectory) -> Self {
+    pub(crate) fn unmoved(trajectory: Trajectory) -> Self {
         Self(trajectory, Vec::new())
     }
 }

@@ -4,6 +4,7 @@
 
 mod constraints;
 mod fixed_view;
+mod global;
 mod globals;
 mod health;
 mod matches;
@@ -14,9 +15,14 @@ mod robust;
 mod rows;
 mod settings;
 mod solve;
+mod step;
 mod window;
 
 pub use fixed_view::FixedView;
+pub use global::{
+    Counts, GlobalProblem, GlobalRegistration, Iteration, Piece, PieceResult, Plan,
+    register_globally,
+};
 pub use globals::{GlobalPrior, Globals, N_GLOBALS, index};
 pub use health::Health;
 pub use normal_equations::NormalEquations;
@@ -24,6 +30,7 @@ pub use response::{PoseResponse, UNMOVED, follow};
 pub use rows::RowGroup;
 pub use settings::{ImuNoise, Settings};
 pub use solve::{Solution, SolveError, Solver, System};
+pub use step::StepSize;
 pub use window::{Initial, Problem, Registration, first_equations, register_window};
 
 /// A vector of all global states or their corrections.

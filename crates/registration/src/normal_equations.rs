@@ -87,6 +87,11 @@ impl NormalEquations {
         self.keys.iter().copied().zip(&self.blocks)
     }
 
+    /// As [`Self::blocks`], to change them.
+    pub(crate) fn blocks_mut(&mut self) -> impl Iterator<Item = ((usize, usize), &mut Block)> {
+        self.keys.iter().copied().zip(&mut self.blocks)
+    }
+
     /// Diagonal of the block between a control point and itself, of which every one exists.
     pub(crate) fn diagonal(&self, control: usize) -> [f64; 6] {
         std::array::from_fn(|i| self.blocks[control][i][i])

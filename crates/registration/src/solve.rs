@@ -5,6 +5,8 @@ mod dense;
 mod layout;
 mod sparse;
 
+use std::ops::Range;
+
 use faer::Mat;
 use faer::linalg::solvers::Solve;
 use faer::sparse::linalg::solvers::Llt as SparseLlt;
@@ -191,6 +193,20 @@ impl Factorized {
             globals[g] = -x[(self.layout.n_knot_unknowns() + i, 0)];
         }
         Solution { knots, globals }
+    }
+
+    /// Covariance of the control points `controls`, of which none is clamped.
+    pub fn covariance(&self, controls: Range<usize>) -> DMatrix<f64> {
+        let first = 6 * (controls.start - self.layout.n_clamped);
+        let n = 6 * controls.len();
+        let mut units = Mat::<f64>::zeros(self.layout.len(), n);
+        for i in 0..n {
+            units[(first + i, i)] = 1.0;
+        }
+        let inverse = self.factor.solve(&units);
+        DMatrix::from_fn(n, n, |i, j| {
+            0.5 * (inverse[(first + i, j)] + inverse[(first + j, i)])
+        })
     }
 
     /// What the system says of the global states, and how the control points go with them.

@@ -5,13 +5,13 @@ use std::sync::Arc;
 
 use bentwing_surfels::SurfelSet;
 use bentwing_trajectory::{CorrectionSpline, Imu, Trajectory};
-use nalgebra::Vector3;
 
 use crate::constraints::{imu, initial, motion, prior, velocity};
 use crate::matches::{self, MatchRows};
 use crate::placed::Placed;
 use crate::response::{self, PoseResponse};
 use crate::solve::{Factorized, Marginals, Solution, SolveError, Solver};
+use crate::step::{self, StepSize};
 use crate::{
     FixedView, GlobalMatrix, GlobalPrior, GlobalVector, Globals, Health, NormalEquations, Settings,
 };
@@ -131,29 +131,6 @@ pub fn first_equations(problem: &Problem<'_>, settings: &Settings) -> NormalEqua
     equations
 }
 
-/// Largest correction of a sample in one step, rad and m.
-#[derive(Clone, Copy, Debug)]
-struct StepSize {
-    turn: f64,
-    shift: f64,
-}
-
-impl StepSize {
-    const UNKNOWN: Self = Self {
-        turn: f64::INFINITY,
-        shift: f64::INFINITY,
-    };
-
-    fn converged(self, settings: &Settings) -> bool {
-        self.turn < settings.min_rotation && self.shift < settings.min_translation
-    }
-
-    /// Whether nearest neighbours may be others now; a fortieth of the finest voxel changes few.
-    fn moves_matches(self) -> bool {
-        self.shift > 0.01 || self.turn > 1e-3
-    }
-}
-
 /// What changes from iteration to iteration.
 struct State {
     trajectory: Trajectory,
@@ -193,7 +170,8 @@ impl State {
         velocity::add(&mut equations, &self.spline, settings);
         prior::add(&mut equations, &problem.prior.information, &self.moved);
         if problem.initial == Initial::FirstPose {
-            initial::add(&mut equations, &self.spline, self.trajectory.start());
+            let start = self.trajectory.start();
+            initial::add(&mut equations, &self.spline, start, &initial::HELD);
         }
         match problem.imu {
             Some(samples) => {
@@ -208,29 +186,12 @@ impl State {
 
     /// Composes a step into the state; returns how large it was.
     fn apply(&mut self, step: &Solution) -> Result<StepSize, SolveError> {
-        let finite = |v: &[f64]| v.iter().all(|x| x.is_finite());
-        if !finite(&step.globals) || !step.knots.iter().all(|k| finite(k)) {
-            return Err(SolveError::NotFinite);
-        }
-        let spline = self.spline;
-        let (mut turn, mut shift) = (0.0_f64, 0.0_f64);
-        let mut corrections = Vec::with_capacity(self.trajectory.len());
-        for n in 0..self.trajectory.len() {
-            let d = spline.evaluate(&step.knots, self.trajectory.time(n));
-            let correction = [
-                Vector3::new(d[0], d[1], d[2]),
-                Vector3::new(d[3], d[4], d[5]),
-            ];
-            turn = turn.max(correction[0].norm());
-            shift = shift.max(correction[1].norm());
-            corrections.push(correction);
-        }
-        self.trajectory.correct(&corrections);
-        self.globals.correct(&step.globals);
+        let (trajectory, globals) = (&mut self.trajectory, &mut self.globals);
+        let size = step::compose(step, trajectory, globals, &self.spline)?;
         for (m, d) in self.moved.iter_mut().zip(step.globals) {
             *m += d;
         }
-        Ok(StepSize { turn, shift })
+        Ok(size)
     }
 
     fn finish(

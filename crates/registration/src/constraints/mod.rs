@@ -5,6 +5,7 @@ pub mod imu;
 pub mod initial;
 pub mod motion;
 pub mod prior;
+pub mod rest;
 pub mod surfel_match;
 pub mod velocity;
 

@@ -89,6 +89,15 @@ impl Scene {
             })
     }
 
+    /// A second of motion with a pause of `seconds`.
+    pub fn still_for(seconds: f64) -> Trajectory {
+        let moved = |n: i32| {
+            (0.01 * f64::from(n)).min(0.3) + (0.01 * f64::from(n) - 0.3 - seconds).max(0.0)
+        };
+        let positions = (0..101).map(|n| Vector3::x() * moved(n)).collect();
+        Trajectory::new(0.0, 0.01, positions, vec![so3::exp(&Vector3::zeros()); 101]).unwrap()
+    }
+
     pub fn spline(&self) -> CorrectionSpline {
         CorrectionSpline::covering(self.trajectory.start(), self.trajectory.end(), 0.2)
     }

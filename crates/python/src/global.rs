@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! `_core.register_globally` and what goes in and comes out.
+
+use std::sync::Arc;
+
+use bentwing_registration as core;
+use bentwing_registration::{GlobalPrior, GlobalProblem, Health, N_GLOBALS};
+use bentwing_surfels::SurfelSet;
+use numpy::{PyArray2, PyReadonlyArray2};
+use pyo3::prelude::*;
+
+use crate::arrays::to_array2;
+use crate::errors::{in_pool, solve_error};
+use crate::registration::{RegistrationSettings, Surfels, global_matrix};
+use crate::trajectory::{Globals, Imu, Samples};
+
+#[derive(FromPyObject)]
+pub(crate) struct MatchingPlan {
+    n_visits: usize,
+    min_overlap: f64,
+    n_held: usize,
+}
+
+/// A trajectory without a break, with the surfels of its stretches and what is known of its slow states.
+#[pyclass(frozen, module = "bentwing._core")]
+pub(crate) struct Piece {
+    samples: Py<Samples>,
+    chunks: Vec<Arc<SurfelSet>>,
+    imu: Option<Py<Imu>>,
+    globals: Py<Globals>,
+    prior: GlobalPrior,
+}
+
+#[pymethods]
+impl Piece {
+    #[new]
+    #[pyo3(signature = (samples, surfels, imu, globals, *, information, offset, frozen))]
+    #[allow(clippy::too_many_arguments, reason = "the parts of a piece")]
+    fn new(
+        samples: Py<Samples>,
+        surfels: Vec<PyRef<'_, Surfels>>,
+        imu: Option<Py<Imu>>,
+        globals: Py<Globals>,
+        information: PyReadonlyArray2<'_, f64>,
+        offset: [f64; N_GLOBALS],
+        frozen: [bool; N_GLOBALS],
+    ) -> PyResult<Self> {
+        Ok(Self {
+            samples,
+            chunks: surfels.iter().map(|s| Arc::clone(&s.0)).collect(),
+            imu,
+            globals,
+            prior: GlobalPrior {
+                information: global_matrix("information", &information)?,
+                offset,
+                frozen,
+            },
+        })
+    }
+}
+
+impl Piece {
+    fn of_problem(&self) -> core::Piece<'_> {
+        core::Piece {
+            trajectory: self.samples.get().0.clone(),
+            chunks: &self.chunks,
+            imu: self.imu.as_ref().map(|imu| &imu.get().0),
+            globals: self.globals.get().0.clone(),
+            prior: &self.prior,
+        }
+    }
+}
+
+/// Result of a global registration.
+#[pyclass(frozen, module = "bentwing._core")]
+pub(crate) struct GlobalRegistration(core::GlobalRegistration);
+
+#[pymethods]
+impl GlobalRegistration {
+    /// Corrected trajectories, in the order of the pieces.
+    #[getter]
+    fn samples(&self) -> Vec<Samples> {
+        let pieces = self.0.pieces.iter();
+        pieces
+            .map(|p| Samples::unmoved(p.trajectory.clone()))
+            .collect()
+    }
+
+    /// Corrected slow states, in the order of the pieces.
+    #[getter]
+    fn globals(&self) -> Vec<Globals> {
+        let pieces = self.0.pieces.iter();
+        pieces.map(|p| Globals(p.globals.clone())).collect()
+    }
+
+    /// Covariances (20, 20) of the slow states, in the order of the pieces; zero where frozen.
+    #[getter]
+    fn covariances<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyArray2<f64>>>> {
+        let rows = |m: &core::GlobalMatrix| -> Vec<[f64; N_GLOBALS]> {
+            m.row_iter()
+                .map(|r| std::array::from_fn(|c| r[c]))
+                .collect()
+        };
+        let pieces = self.0.pieces.iter();
+        pieces
+            .map(|p| to_array2(py, &rows(&p.covariance)))
+            .collect()
+    }
+
+    /// Of each iteration what its matches said before its step, and the largest correction: matches,
+    /// those between stretches that do not follow each other, share of inliers, weighted root mean
+    /// square in standard deviations, rad, m.
+    #[getter]
+    fn iterations(&self) -> Vec<(usize, usize, f64, f64, f64, f64)> {
+        let record = |i: &core::Iteration| {
+            let (share, rms) = fit(&i.health);
+            let n = i.health.n_moving;
+            (n, i.n_far, share, rms, i.step.turn, i.step.shift)
+        };
+        self.0.iterations.iter().map(record).collect()
+    }
+
+    /// Share of inliers and weighted root mean square of the matches of the final trajectories.
+    #[getter]
+    fn fit(&self) -> (f64, f64) {
+        fit(&self.0.health)
+    }
+
+    /// Unknowns, pairs of stretches, those that do not follow each other, surfels.
+    #[getter]
+    fn counts(&self) -> (usize, usize, usize, usize) {
+        let c = self.0.counts;
+        (c.n_unknowns, c.n_links, c.n_far_links, c.n_surfels)
+    }
+
+    /// Whether the last step was below the thresholds.
+    #[getter]
+    fn converged(&self) -> bool {
+        self.0.converged
+    }
+
+    /// Samples without inertial data.
+    #[getter]
+    fn n_blind(&self) -> usize {
+        self.0.pieces.iter().map(|p| p.n_blind).sum()
+    }
+}
+
+fn fit(health: &Health) -> (f64, f64) {
+    let share = health.n_inliers as f64 / health.n_moving.max(1) as f64;
+    let mean_square = health.squared_residual / health.weight.max(f64::MIN_POSITIVE);
+    (share, mean_square.sqrt())
+}
+
+/// Corrects whole trajectories and their slow states by everything that was seen more than once.
+#[pyfunction]
+#[pyo3(signature = (pieces, *, settings, plan, threads = 0))]
+pub(crate) fn register_globally(
+    py: Python<'_>,
+    pieces: Vec<Py<Piece>>,
+    settings: RegistrationSettings,
+    plan: MatchingPlan,
+    threads: usize,
+) -> PyResult<GlobalRegistration> {
+    let problem = GlobalProblem {
+        pieces: pieces.iter().map(|p| p.get().of_problem()).collect(),
+        plan: core::Plan {
+            n_visits: plan.n_visits,
+            min_overlap: plan.min_overlap,
+            n_held: plan.n_held,
+        },
+    };
+    let settings = settings.into();
+    in_pool(py, threads, || core::register_globally(&problem, &settings))?
+        .map(GlobalRegistration)
+        .map_err(|e| solve_error(py, &e))
+}

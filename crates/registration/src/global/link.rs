@@ -1,0 +1,239 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! The matches of two stretches, and their rows.
+
+#![allow(
+    clippy::inline_always,
+    reason = "only what is inlined into a dispatched function uses the machine's instructions"
+)]
+
+use bentwing_neighbors::{Search, claimed_pairs, mutual_pairs};
+use pulp::{Simd, WithSimd};
+
+use super::chunk::Laid;
+use super::joint::{Joint, N_STAND_INS};
+use super::piece::PieceState;
+use crate::constraints::surfel_match::{self, MatchPlane};
+use crate::placed::PlacedSurfel;
+use crate::robust::cauchy_weight;
+use crate::rows::RowGroup;
+use crate::{Health, N_GLOBALS, NormalEquations, Settings};
+
+/// A surfel of the one stretch, one of the other, and their plane.
+#[derive(Clone, Copy, Debug)]
+pub struct LinkMatch {
+    i: u32,
+    j: u32,
+    plane: MatchPlane,
+}
+
+impl LinkMatch {
+    /// The match of surfel `i` of `a` with surfel `j` of `b`.
+    pub fn between(a: &Laid, i: usize, b: &Laid, j: usize, range_sigma: f64) -> Self {
+        let (surfel, other) = (&a.placed.surfels[i], &b.placed.surfels[j]);
+        Self {
+            i: i as u32,
+            j: j as u32,
+            plane: MatchPlane::new(surfel, other, range_sigma),
+        }
+    }
+
+    /// Its normal and its weight.
+    #[cfg(test)]
+    pub fn plane_at(&self, a: &Laid) -> (nalgebra::Vector3<f64>, f64) {
+        let surfel = &a.placed.surfels[self.i as usize];
+        (self.plane.normal(surfel), self.plane.information)
+    }
+}
+
+/// Two stretches, or one with itself, that are matched.
+pub struct Link {
+    pub a: usize,
+    pub b: usize,
+    /// Pieces of the two.
+    pub pieces: [usize; 2],
+    /// Whether they are the same or follow each other.
+    pub is_near: bool,
+    pub matches: Vec<LinkMatch>,
+}
+
+impl Link {
+    /// Nearest neighbours that found each other, on every level.
+    pub fn find(&self, a: &Laid, b: &Laid, settings: &Settings) -> Vec<LinkMatch> {
+        let mut found = Vec::new();
+        for level in 0..a.grids.len().min(b.grids.len()) {
+            let first = [a, b].map(|laid| laid.placed.level_starts[level] as u32);
+            for (i, j) in self.pairs(a, b, level, settings) {
+                let (i, j) = ((first[0] + i) as usize, (first[1] + j) as usize);
+                found.push(LinkMatch::between(a, i, b, j, settings.range_sigma));
+            }
+        }
+        found
+    }
+
+    fn pairs(&self, a: &Laid, b: &Laid, level: usize, settings: &Settings) -> Vec<(u32, u32)> {
+        let itself = self.a == self.b;
+        let search = Search {
+            // Of every other visit the best counterpart.
+            k: if itself { settings.n_neighbors } else { 1 },
+            max_distance: settings.max_match_distance as f32,
+            // Pieces may have clocks of their own.
+            min_time_gap: if self.pieces[0] == self.pieces[1] {
+                settings.min_match_gap as f32
+            } else {
+                -1.0
+            },
+        };
+        let nearest = b.grids[level].nearest(&a.grids[level], &search);
+        if itself {
+            mutual_pairs(&nearest).collect()
+        } else {
+            claimed_pairs(&nearest, b.grids[level].len())
+        }
+    }
+}
+
+/// Where the control points of a link stand in equations that hold no others.
+struct Places {
+    /// Control point of the first surfel's piece that is the first one.
+    first: usize,
+    /// What to add to a control point of the second surfel's piece.
+    second: isize,
+    /// Where the global states of the second surfel's piece stand, if it is another one.
+    stand_in: Option<usize>,
+    /// Control points in the whole system.
+    controls: Vec<usize>,
+}
+
+impl Places {
+    fn new(link: &Link, laid: [&Laid; 2], joint: &Joint) -> Self {
+        let [(a, a_end), (b, b_end)] = laid.map(range);
+        let [p, q] = link.pieces;
+        let mut controls: Vec<usize>;
+        let (first, second);
+        if p == q && b <= a_end {
+            first = a.min(b);
+            second = -(first as isize);
+            controls = (first..a_end.max(b_end))
+                .map(|k| joint.control(p, k))
+                .collect();
+        } else {
+            first = a;
+            second = (a_end - a) as isize - b as isize;
+            controls = (a..a_end).map(|k| joint.control(p, k)).collect();
+            controls.extend((b..b_end).map(|k| joint.control(q, k)));
+        }
+        let stand_in = (p != q).then_some(controls.len());
+        if p != q {
+            controls.extend((0..N_STAND_INS).map(|s| joint.stand_in(q) + s));
+        }
+        Self {
+            first,
+            second,
+            stand_in,
+            controls,
+        }
+    }
+
+    fn of_first(&self, surfel: &PlacedSurfel) -> usize {
+        surfel.basis.first - self.first
+    }
+
+    fn of_second(&self, surfel: &PlacedSurfel) -> usize {
+        surfel.basis.first.wrapping_add_signed(self.second)
+    }
+}
+
+/// The control points that move a stretch.
+fn range(laid: &Laid) -> (usize, usize) {
+    let firsts = laid.placed.surfels.iter().map(|s| s.basis.first);
+    let (low, high) = firsts.fold((usize::MAX, 0), |(low, high), f| (low.min(f), high.max(f)));
+    (low.min(high), high + 4)
+}
+
+/// The rows of a link that are summed in one go.
+pub struct LinkSum<'a> {
+    pub link: &'a Link,
+    pub matches: &'a [LinkMatch],
+    pub laid: [&'a Laid; 2],
+    pub states: &'a [PieceState<'a>],
+    pub joint: &'a Joint,
+    pub scale: f64,
+}
+
+/// Equations of a link, their control points in the whole system, and its health.
+pub struct LinkEquations {
+    pub equations: NormalEquations,
+    pub controls: Vec<usize>,
+    pub health: Health,
+}
+
+impl WithSimd for LinkSum<'_> {
+    type Output = LinkEquations;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Self::Output {
+        self.sum()
+    }
+}
+
+impl LinkSum<'_> {
+    #[inline(always)]
+    fn sum(&self) -> LinkEquations {
+        let places = Places::new(self.link, self.laid, self.joint);
+        let mut equations = NormalEquations::new(places.controls.len());
+        let (mut rows, mut health) = (RowGroup::new([]), Health::default());
+        let group = |m: &LinkMatch| {
+            let [s, t] = self.surfels(m);
+            (places.of_first(s), places.of_second(t))
+        };
+        let mut ordered: Vec<_> = self.matches.iter().map(|m| (group(m), m)).collect();
+        ordered.sort_by_key(|&(group, _)| group);
+        for of_group in ordered.chunk_by(|a, b| a.0 == b.0) {
+            let (first, second) = of_group[0].0;
+            let stand_ins = places.stand_in.into_iter().flat_map(|s| s..s + N_STAND_INS);
+            let controls = (first..first + 4).chain(second..second + 4);
+            rows.reset(controls.chain(stand_ins));
+            for (_, m) in of_group {
+                self.add_row(m, &mut rows, &mut health);
+            }
+            rows.flush(&mut equations);
+        }
+        LinkEquations {
+            equations,
+            controls: places.controls,
+            health,
+        }
+    }
+
+    #[inline(always)]
+    fn surfels(&self, m: &LinkMatch) -> [&PlacedSurfel; 2] {
+        let [a, b] = self.laid;
+        [
+            &a.placed.surfels[m.i as usize],
+            &b.placed.surfels[m.j as usize],
+        ]
+    }
+
+    #[inline(always)]
+    fn add_row(&self, m: &LinkMatch, rows: &mut RowGroup, health: &mut Health) {
+        let [surfel, other] = self.surfels(m);
+        let heads = self.link.pieces.map(|p| &self.states[p].globals.head);
+        let n = &m.plane.normal(surfel);
+        rows.globals_mut().fill(0.0);
+        surfel_match::write_knots(&mut rows.knots_mut()[..24], surfel, n, 1.0);
+        surfel_match::add_globals(rows.globals_mut(), heads[0], surfel, n, 1.0);
+        surfel_match::write_knots(&mut rows.knots_mut()[24..48], other, n, -1.0);
+        if self.link.pieces[0] == self.link.pieces[1] {
+            surfel_match::add_globals(rows.globals_mut(), heads[1], other, n, -1.0);
+        } else {
+            let stand_ins = &mut rows.knots_mut()[48..];
+            stand_ins.fill(0.0);
+            surfel_match::add_globals(&mut stand_ins[..N_GLOBALS], heads[1], other, n, -1.0);
+        }
+        let residual = n.dot(&(surfel.mean - other.mean));
+        let x = residual * m.plane.information.sqrt();
+        let w = cauchy_weight(x, self.scale);
+        rows.add(residual, w * m.plane.information);
+        health.add(false, x, w, n, &surfel.lever);
+    }
+}

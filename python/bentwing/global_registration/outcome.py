@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""What a global registration says, as an `Estimate` and as a record."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bentwing import geometry
+from bentwing.estimators.core_states import refined_mount
+from bentwing.estimators.segments import joined
+from bentwing.estimators.slow_states import named_std
+from bentwing.global_registration.stretches import interval_of
+from bentwing.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from bentwing import _core
+    from bentwing.estimators.interface import Estimate
+
+# So much smaller may the share of inliers become by chance.
+TOLERATED_LOSS = 0.01
+
+
+def improved(found: _core.GlobalRegistration) -> str:
+    """Return why a result cannot be trusted, or nothing."""
+    if not any(i[0] for i in found.iterations):
+        return "no surface was seen twice"
+    if not found.converged:
+        turn, shift = found.iterations[-1][4:]
+        return (
+            f"the global registration did not settle in {len(found.iterations)} iterations; the "
+            f"last one moved the trajectory by {1e3 * shift:.1f} mm and {np.degrees(turn):.3f}°"
+        )
+    before, after = found.iterations[0][2], found.fit[0]
+    if after < before - TOLERATED_LOSS:
+        return (
+            f"of the matches {before:.1%} fitted before the global registration and {after:.1%} "
+            "after it"
+        )
+    return ""
+
+
+def closed_estimate(
+    estimate: Estimate, found: _core.GlobalRegistration, segments: Sequence[Trajectory]
+) -> Estimate:
+    """Return the estimate with corrected segments and calibration.
+
+    Parameters
+    ----------
+    segments : of the estimate, as they were registered
+    """
+    dt = interval_of(estimate)
+    moved = [
+        Trajectory(s.times, np.asarray(n.positions), np.asarray(n.quats_xyzw))
+        for s, n in zip(segments, found.samples, strict=True)
+    ]
+    slow, covariance = found.globals[-1], found.covariances[-1]
+    frozen = np.diag(covariance) == 0.0
+    calibration = replace(
+        estimate.calibration,
+        latency=slow.latency,
+        mount=refined_mount(estimate.calibration.mount, slow),
+        gyro_bias=slow.gyro_bias,
+        accel_bias=slow.accel_bias,
+        std={**estimate.calibration.std, **named_std(covariance, frozen)},
+    )
+    return replace(estimate, trajectory=joined(moved, dt), calibration=calibration)
+
+
+def record_of(
+    found: _core.GlobalRegistration, segments: Sequence[Trajectory], timings: dict[str, float]
+) -> dict[str, Any]:
+    """Return what was done, for run.json; lengths in m, angles in rad, times in s."""
+    n_unknowns, n_links, n_far_links, n_surfels = found.counts
+    names = (
+        "n_matches",
+        "n_far_matches",
+        "inlier_share",
+        "residual_rms",
+        "rotation",
+        "translation",
+    )
+    pairs = list(zip(segments, found.samples, strict=True))
+    shifts = [np.linalg.norm(n.positions - s.positions, axis=1).max() for s, n in pairs]
+    turns = [_turns(s.quats_xyzw, n.quats_xyzw).max() for s, n in pairs]
+    return {
+        "n_unknowns": n_unknowns,
+        "n_stretch_pairs": n_links,
+        "n_revisits": n_far_links,
+        "n_surfels": n_surfels,
+        "converged": found.converged,
+        "iterations": [dict(zip(names, i, strict=True)) for i in found.iterations],
+        "inlier_share": found.fit[0],
+        "residual_rms": found.fit[1],
+        "largest_translation": float(max(shifts)),
+        "largest_rotation": float(max(turns)),
+        "timings": timings,
+    }
+
+
+def _turns(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    turn = geometry.log(geometry.multiply(after, geometry.inverse(before)))
+    return np.asarray(np.linalg.norm(turn, axis=1))

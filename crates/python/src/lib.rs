@@ -10,6 +10,7 @@ use pyo3::prelude::*;
 
 mod arrays;
 mod errors;
+mod kalman;
 mod laz;
 mod ndt;
 mod pose_graph;
@@ -22,6 +23,8 @@ mod trajectory;
 mod _core {
     use pyo3::prelude::*;
 
+    #[pymodule_export]
+    use crate::kalman::{KalmanFilter, KalmanSweep};
     #[pymodule_export]
     use crate::laz::LazCompressor;
     #[pymodule_export]

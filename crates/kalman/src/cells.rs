@@ -50,6 +50,8 @@ pub(crate) struct Cells<S> {
     cells: Vec<Cell>,
     /// One per cell, apart from it because the search reads nothing else.
     shapes: Vec<Option<S>>,
+    /// What `insert` was told when the cell got its shape.
+    births: Vec<u32>,
 }
 
 impl<S: Shape> Cells<S> {
@@ -60,6 +62,7 @@ impl<S: Shape> Cells<S> {
             places: FxHashMap::default(),
             cells: Vec::new(),
             shapes: Vec::new(),
+            births: Vec::new(),
         }
     }
 
@@ -68,15 +71,18 @@ impl<S: Shape> Cells<S> {
         self.shapes.iter().flatten().count()
     }
 
-    /// The shape at a place in the map, if there is one.
+    /// The shape at a place in the map, if there is one, and its birth.
     #[inline]
-    pub(crate) fn at(&self, p: &Vector3<f64>) -> Option<&S> {
+    pub(crate) fn at(&self, p: &Vector3<f64>) -> Option<(&S, u32)> {
         let place = self.places.get(&key(&(*p).into(), 1.0 / self.size))?;
-        self.shapes[*place as usize].as_ref()
+        let shape = self.shapes[*place as usize].as_ref()?;
+        Some((shape, self.births[*place as usize]))
     }
 
     /// Adds points in the map, in their order; returns how many came to a voxel that had no shape.
-    pub(crate) fn insert(&mut self, points: &[Vector3<f64>], sigma: f64) -> usize {
+    ///
+    /// Voxels that get a shape by them remember `birth`.
+    pub(crate) fn insert(&mut self, points: &[Vector3<f64>], sigma: f64, birth: u32) -> usize {
         let mut n_new = 0;
         let mut touched: Vec<u32> = Vec::with_capacity(points.len());
         for p in points {
@@ -89,6 +95,9 @@ impl<S: Shape> Cells<S> {
         for i in touched {
             let cell = &self.cells[i as usize];
             let shape = S::of(&cell.moments(), &cell.middle, self.size, sigma);
+            if self.shapes[i as usize].is_none() {
+                self.births[i as usize] = birth;
+            }
             self.shapes[i as usize] = shape;
         }
         n_new
@@ -107,6 +116,7 @@ impl<S: Shape> Cells<S> {
                 now: Moments::of_point((p - middle).into(), 0.0, 0.0),
             });
             self.shapes.push(None);
+            self.births.push(0);
             return (Some(place), true);
         };
         let is_new = self.shapes[place as usize].is_none();
@@ -133,6 +143,8 @@ impl<S: Shape> Cells<S> {
         self.cells.retain(|_| *kept.next().unwrap_or(&false));
         let mut kept = near.iter();
         self.shapes.retain(|_| *kept.next().unwrap_or(&false));
+        let mut kept = near.iter();
+        self.births.retain(|_| *kept.next().unwrap_or(&false));
         let places = self.cells.iter().enumerate();
         self.places = places.map(|(i, c)| (c.key, i as u32)).collect();
     }

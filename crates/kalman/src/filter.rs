@@ -2,7 +2,8 @@
 //! The filter: inertial samples carry the state on, sweeps of the lidar correct it.
 
 use bentwing_surfels::thin;
-use nalgebra::{Matrix6, Vector3};
+use bentwing_trajectory::so3;
+use nalgebra::{Matrix3, Matrix6, SMatrix, Vector3};
 
 use crate::drift::Drift;
 use crate::error::KalmanError;
@@ -12,7 +13,7 @@ use crate::measure::{Moment, Mounts, Turning, place};
 use crate::nodes::{Node, correct, moment};
 use crate::odometry::{HighRate, OdometryPose};
 use crate::predict::{Noise, Sample, spread, step, walk};
-use crate::state::{Mounted, Square, State, at};
+use crate::state::{DIM, Mounted, Square, State, at};
 use crate::update::{Fit, Rules, Seen, update};
 
 /// No carrier is faster, m/s.
@@ -106,7 +107,6 @@ pub struct Filter {
     odometry: HighRate,
     blind: f64,
     drift: Drift,
-    placed: Vector3<f64>,
 }
 
 impl Filter {
@@ -133,7 +133,6 @@ impl Filter {
             odometry: HighRate::new(start.time, settings.odometry_interval, settings.smoothing),
             blind: 0.0,
             drift: Drift::default(),
-            placed: start.state.pose.t,
         }
     }
 
@@ -305,11 +304,12 @@ impl Filter {
             |(f, m): &(Feature, Moment)| place(f, m, &turning, (&self.state, &mounts), &error).x;
         let planar: Vec<_> = planar.iter().map(placed).collect();
         let edges: Vec<_> = edges.iter().map(placed).collect();
-        let new_share = self.map.insert(&planar, &edges);
-        let in_map: Matrix6<f64> = self.P.fixed_view::<6, 6>(0, 0).into_owned();
+        let birth = self.drift.birth();
+        let new_share = self.map.insert(&planar, &edges, birth);
+        let (base, in_map) = self.base();
         let here = self.state.pose.t;
-        self.drift.add(&(here - self.placed), &in_map, new_share);
-        self.placed = here;
+        let matched = fit.as_ref().map_or(&[][..], |f| &f.births);
+        self.drift.add(matched, &in_map, &base);
         self.map.follow(&here);
         correct(&mut self.nodes, self.updated, &error);
         self.release();
@@ -341,7 +341,28 @@ impl Filter {
 
     /// Covariance (6 × 6) of attitude and position, with that of the map they are in.
     pub fn pose_covariance(&self) -> Matrix6<f64> {
-        self.P.fixed_view::<6, 6>(at::ROTATION, at::ROTATION) + self.drift.covariance()
+        self.P.fixed_view::<6, 6>(at::ROTATION, at::ROTATION)
+            + self.drift.covariance(&self.state.pose.t)
+    }
+
+    /// Position of the motor (or the fixed lidar) and the covariance of its pose: what it sees comes
+    /// to lie where it is, however the IMU is mounted on it.
+    fn base(&self) -> (Vector3<f64>, Matrix6<f64>) {
+        let R = self.state.pose.R.to_rotation_matrix().into_inner();
+        let lever = R * self.state.base.t;
+        let mut effect = SMatrix::<f64, 6, DIM>::zeros();
+        let mut set = |r: usize, c: usize, m: &Matrix3<f64>| {
+            effect.fixed_view_mut::<3, 3>(r, c).copy_from(m);
+        };
+        set(0, at::ROTATION, &Matrix3::identity());
+        set(0, at::BASE_ROTATION, &R);
+        set(3, at::POSITION, &Matrix3::identity());
+        set(3, at::ROTATION, &-so3::hat(&lever));
+        set(3, at::BASE_TRANSLATION, &R);
+        (
+            self.state.pose.t + lever,
+            effect * self.P * effect.transpose(),
+        )
     }
 
     fn require_health(&self) -> Result<(), KalmanError> {

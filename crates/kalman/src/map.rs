@@ -132,26 +132,31 @@ impl LocalMap {
         self.planes.iter().map(Cells::n_shapes).sum()
     }
 
-    /// The finest plane at a place.
+    /// The finest plane at a place, and when it was seen first.
     #[inline]
-    pub(crate) fn plane(&self, x: &Vector3<f64>) -> Option<&Plane> {
+    pub(crate) fn plane(&self, x: &Vector3<f64>) -> Option<(&Plane, u32)> {
         self.planes.iter().find_map(|level| level.at(x))
     }
 
     /// The line at a place.
     #[inline]
     pub(crate) fn line(&self, x: &Vector3<f64>) -> Option<&Line> {
-        self.lines.at(x)
+        self.lines.at(x).map(|(line, _)| line)
     }
 
-    /// Adds features in the map; returns the share of the planar ones that saw something new.
-    pub(crate) fn insert(&mut self, planar: &[Vector3<f64>], edges: &[Vector3<f64>]) -> f64 {
+    /// Adds features in the map, new planes with a `birth`; returns the share of the planar ones that saw something new.
+    pub(crate) fn insert(
+        &mut self,
+        planar: &[Vector3<f64>],
+        edges: &[Vector3<f64>],
+        birth: u32,
+    ) -> f64 {
         // On the finest level what is far away is always new.
         let told = 1.min(self.planes.len() - 1);
         let n_new: Vec<usize> = (self.planes.iter_mut())
-            .map(|level| level.insert(planar, self.sigma))
+            .map(|level| level.insert(planar, self.sigma, birth))
             .collect();
-        self.lines.insert(edges, self.sigma);
+        self.lines.insert(edges, self.sigma, birth);
         n_new[told] as f64 / planar.len().max(1) as f64
     }
 
@@ -191,8 +196,8 @@ mod tests {
         let edge: Vec<_> = (0..20)
             .map(|i| Vector3::new(0.3, 0.3, 0.045 * f64::from(i)))
             .collect();
-        map.insert(&wall(3.25), &edge);
-        let plane = map.plane(&Vector3::new(3.3, 0.2, 0.2)).ok_or("no plane")?;
+        map.insert(&wall(3.25), &edge, 7);
+        let (plane, _) = map.plane(&Vector3::new(3.3, 0.2, 0.2)).ok_or("no plane")?;
         assert!(plane.normal.x.abs() > 0.9999 && (plane.mean.x - 3.25).abs() < 1e-9);
         let (near, far) = (plane.mean, plane.mean + Vector3::new(0.0, 1.0, 0.0));
         assert!(plane.height_variance(&far) > 10.0 * plane.height_variance(&near));
@@ -208,7 +213,7 @@ mod tests {
         let line: Vec<_> = (0..40)
             .map(|i| Vector3::new(2.2, 0.01 * f64::from(i), 0.2))
             .collect();
-        map.insert(&line, &[]);
+        map.insert(&line, &[], 0);
         assert_eq!(map.n_planes(), 0);
     }
 
@@ -216,11 +221,11 @@ mod tests {
     fn the_first_view_of_a_place_stays_and_the_last_one_replaces() -> Result<(), &'static str> {
         for (memory, x) in [(Memory::First(60), 3.2), (Memory::Last(60), 3.3)] {
             let mut map = LocalMap::new(&MapSettings { memory, ..SETTINGS }, 0.02);
-            map.insert(&wall(3.2), &[]);
+            map.insert(&wall(3.2), &[], 0);
             for _ in 0..3 {
-                map.insert(&wall(3.3), &[]);
+                map.insert(&wall(3.3), &[], 0);
             }
-            let plane = map.plane(&Vector3::new(3.3, 0.2, 0.2)).ok_or("no plane")?;
+            let (plane, _) = map.plane(&Vector3::new(3.3, 0.2, 0.2)).ok_or("no plane")?;
             assert!((plane.mean.x - x).abs() < 0.03, "{}", plane.mean);
         }
         Ok(())
@@ -229,7 +234,7 @@ mod tests {
     #[test]
     fn what_is_out_of_reach_is_forgotten() {
         let mut map = LocalMap::new(&SETTINGS, 0.02);
-        map.insert(&wall(3.25), &[]);
+        map.insert(&wall(3.25), &[], 0);
         map.follow(&Vector3::zeros());
         assert!(map.n_planes() > 0);
         map.follow(&Vector3::new(30.0, 0.0, 0.0));

@@ -16,7 +16,7 @@ const GATE: f64 = 4.0;
 /// Scale of the Cauchy weights, in standard deviations: of the first iteration, and of the others.
 const CAUCHY: (f64, f64) = (4.0, 2.0);
 /// A shorter step, rad and m, is the last one.
-const LAST_STEP: (f64, f64) = (1e-5, 1e-4);
+const LAST_STEP: (f64, f64) = (5e-5, 3e-4);
 /// With fewer matches a sweep says nothing.
 const MIN_MATCHES: usize = 40;
 
@@ -56,6 +56,8 @@ pub struct Fit {
     pub translation: Matrix3<f64>,
     /// The same about the rotation.
     pub rotation: Matrix3<f64>,
+    /// When the matched planes were seen first.
+    pub(crate) births: Vec<u32>,
 }
 
 impl Fit {
@@ -76,6 +78,7 @@ struct Sums {
     weight: f64,
     normalized: f64,
     squared: f64,
+    births: Vec<u32>,
 }
 
 impl Sums {
@@ -89,6 +92,7 @@ impl Sums {
             weight: 0.0,
             normalized: 0.0,
             squared: 0.0,
+            births: Vec::new(),
         }
     }
 
@@ -168,10 +172,10 @@ pub(crate) fn update(
         return None;
     }
     (*state, *P) = (x, posterior);
-    Some(fit(&sums, iterations, converged))
+    Some(fit(sums, iterations, converged))
 }
 
-fn fit(sums: &Sums, iterations: usize, converged: bool) -> Fit {
+fn fit(sums: Sums, iterations: usize, converged: bool) -> Fit {
     let even = |m: Matrix3<f64>| {
         let lower = m.lower_triangle();
         lower + lower.transpose() - Matrix3::from_diagonal(&m.diagonal())
@@ -187,6 +191,7 @@ fn fit(sums: &Sums, iterations: usize, converged: bool) -> Fit {
         converged,
         rotation: even(sums.information.fixed_view::<3, 3>(0, 0).into_owned()),
         translation: even(sums.information.fixed_view::<3, 3>(3, 3).into_owned()),
+        births: sums.births,
     }
 }
 
@@ -208,7 +213,7 @@ fn sums(
     let mut sums = Sums::new();
     for (feature, moment) in seen.planar {
         let placed = measure::place(feature, moment, &seen.turning, (state, &mounts), error);
-        let Some(plane) = map.plane(&placed.x) else {
+        let Some((plane, birth)) = map.plane(&placed.x) else {
             continue;
         };
         let e = plane.normal.dot(&(placed.x - plane.mean));
@@ -218,6 +223,7 @@ fn sums(
             continue;
         }
         sums.n += 1;
+        sums.births.push(birth);
         sums.add(&placed.row(&plane.normal), e, s2, cauchy);
     }
     for (feature, moment) in seen.edges {

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bentwing import geometry
 from bentwing.estimators.mount import FixedMount, MotorMount, Mount, Pose
 from bentwing.estimators.slow_states import WALK, initial_std
 from bentwing.estimators.start import STANDARD_GRAVITY
@@ -137,7 +138,7 @@ def first_state(start: Start, mount: Mount) -> FilterState:
 def first_covariance(start: Start, mount: Mount) -> NDArray[np.float64]:
     """Return the covariance (31, 31) at the start.
 
-    The first pose is the map: it is known exactly, and the doubt is in gravity's direction. Of the
+    The first pose is known exactly, see `anchored`, and the doubt is in gravity's direction. Of the
     lidar behind a motor the turn about the axis and the shift along it are those of the motor before
     it, so they have none.
     """
@@ -162,6 +163,27 @@ def first_covariance(start: Start, mount: Mount) -> NDArray[np.float64]:
         covariance[LIDAR_TRANSLATION, LIDAR_TRANSLATION] = std["motor_offset"] ** 2 * across
         put(ENCODER_DELAY, std["latency"])
     return covariance
+
+
+def anchored(covariance: NDArray[np.float64], state: FilterState) -> NDArray[np.float64]:
+    """Let the first views of the lidar be what the map is.
+
+    The map is what the lidar sees from its first pose: that of the base (motor or lidar) is exact, and
+    the IMU is as far from where it is said to be as the mount is wrong. With an exact IMU instead,
+    the map would seem to confirm the mount it was made with:
+    `δr = -R δr_base`, `δp = -δr × R t_base - R δt_base`.
+
+    Parameters
+    ----------
+    covariance : (31, 31) with nothing about the pose
+    """
+    R = geometry.to_matrices(np.array([state.pose[1]]))[0]
+    lever = R @ np.array(state.base[0])
+    effect = np.eye(N_STATES)
+    effect[ROTATION, BASE_ROTATION] = -R
+    effect[POSITION, BASE_ROTATION] = -np.cross(lever, R, axisb=0, axisc=0)
+    effect[POSITION, BASE_TRANSLATION] = -R
+    return np.asarray(effect @ covariance @ effect.T)
 
 
 def _mounts(mount: Mount) -> tuple[Pose, Pose]:

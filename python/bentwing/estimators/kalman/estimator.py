@@ -15,6 +15,7 @@ from bentwing.estimators.kalman.core import (
     DT,
     FilterSettings,
     FilterState,
+    anchored,
     first_covariance,
     first_state,
 )
@@ -231,7 +232,7 @@ class Kalman:
             renew=self._rehearsing,
         )
         assert self._first is not None
-        return FilterPass(settings, self._first, state, covariance)
+        return FilterPass(settings, self._first, state, anchored(covariance, state))
 
     def _begin_again(self) -> bool:
         """Leave the rehearsal: from the start again, with what was learned."""

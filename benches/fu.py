@@ -18,12 +18,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scoring import in_flight
 
 from bentwing import estimators
 from bentwing.errors import BentwingError
 from bentwing.estimators.kalman import KalmanSettings
 from bentwing.estimators.settings import ContinuousSettings
-from bentwing.evaluate.nees import levelled_covariances, nees, nees_bounds, pose_errors_from_start
+from bentwing.evaluate.nees import levelled_covariances, nees, nees_bounds, pose_errors_since
 from bentwing.evaluate.trajectory import absolute_error
 from bentwing.preprocess import preprocess
 from bentwing.recording import Payload, Recording
@@ -86,9 +87,10 @@ def run(case: Case, folder: Path, threads: int) -> dict:
 def consistency(engine, estimate, truth) -> dict:
     """NEES of pose and position after the last sweep, and on average over the run."""
     times, covariances = engine.pose_covariances()
-    inside = (times <= estimate.trajectory.times[-1]) & truth.covers(times)
+    take_off, _ = in_flight(truth)
+    inside = (times <= estimate.trajectory.times[-1]) & truth.covers(times) & (times > take_off)
     times, covariances = times[inside], covariances[inside]
-    errors = pose_errors_from_start(estimate.trajectory, truth, times)
+    errors = pose_errors_since(take_off, estimate.trajectory, truth, times)
     positions, _ = estimate.trajectory.interpolate(times)
     std = np.array(estimate.calibration.std["gravity"])
     doubt = levelled_covariances(covariances, positions, std)
@@ -96,7 +98,7 @@ def consistency(engine, estimate, truth) -> dict:
     return {
         "nees": float(pose[-1]),
         "nees_position": float(position[-1]),
-        "nees_mean": float(pose[20:].mean()),
+        "nees_mean": float(pose.mean()),
         "errors": errors[-1],
         "std": np.sqrt(np.diag(doubt[-1])),
     }

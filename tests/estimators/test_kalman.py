@@ -102,14 +102,15 @@ def test_the_odometry_keeps_its_rate_and_is_smooth(turned):
     assert len(raw.times) == pytest.approx(50 * np.ptp(estimate.trajectory.times), abs=2)
 
 
-def test_stated_covariances_grow_with_the_way_and_have_no_negative_direction(turned):
+def test_stated_covariances_become_small_and_have_no_negative_direction(turned):
     engine, *_ = turned
     times, covariances = engine.pose_covariances()
     assert len(times) > 200
     values = np.linalg.eigvalsh(covariances[1:])
     assert values.min() >= -1e-12
     position = np.sqrt(np.trace(covariances[:, 3:, 3:], axis1=1, axis2=2))
-    assert position[30] < position[-1] < 0.1
+    # At first the place of the IMU beside the lidar is known to 5 mm an axis, and turned by 9 mrad.
+    assert 0.002 < position[-1] < 0.03
 
 
 def test_without_rings_points_are_features(turning):

@@ -18,29 +18,29 @@ _QUANTILE = 1.959963984540054
 """Of the normal distribution at 97.5 %."""
 
 
-def pose_errors_from_start(
-    estimate: Trajectory, truth: Trajectory, times: NDArray[np.float64]
+def pose_errors_since(
+    reference: float, estimate: Trajectory, truth: Trajectory, times: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Errors of an estimate against a truth in whose frame its first pose lies, but for the tilt.
+    """Errors of an estimate that agrees with the truth at a time of reference, but for the tilt.
 
-    The map of an odometry begins at its first pose: position and heading are right there, and what
-    is up was measured.
+    An odometry chooses position and heading of its frame, and measures what is up.
 
     Parameters
     ----------
+    reference : s, at which positions and headings agree: that of take-off
     times : (K,) s, within both
 
     Returns
     -------
     (K, 6) rotation, rad, and translation, m: `R_estimate = Exp(e) R_true`, map frame
     """
-    first = estimate.times[:1]
-    at, quat = truth.interpolate(np.maximum(first, truth.times[0]))
-    turn = geometry.multiply(estimate.quats_xyzw[:1], geometry.inverse(quat))
+    at, quat = truth.interpolate(np.array([reference]))
+    there, estimated = estimate.interpolate(np.array([reference]))
+    turn = geometry.multiply(estimated, geometry.inverse(quat))
     heading = np.array([[0.0, 0.0, turn[0, 2], turn[0, 3]]])
     heading /= np.linalg.norm(heading)
     positions, quats = truth.interpolate(times)
-    positions = geometry.rotate(heading, positions - at) + estimate.positions[:1]
+    positions = geometry.rotate(heading, positions - at) + there
     quats = geometry.multiply(heading, quats)
     found, found_quats = estimate.interpolate(times)
     turned = geometry.log(geometry.multiply(found_quats, geometry.inverse(quats)))

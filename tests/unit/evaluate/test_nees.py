@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from bentwing import geometry
-from bentwing.evaluate.nees import levelled_covariances, nees, nees_bounds, pose_errors_from_start
+from bentwing.evaluate.nees import levelled_covariances, nees, nees_bounds, pose_errors_since
 from bentwing.trajectory import Trajectory
 
 RNG = np.random.default_rng(3)
@@ -42,7 +42,7 @@ def test_a_shifted_and_turned_copy_has_no_error():
         geometry.rotate(turn, truth.positions) + [1.0, 2.0, 3.0],
         geometry.multiply(turn, truth.quats_xyzw),
     )
-    errors = pose_errors_from_start(moved, truth, truth.times[::10])
+    errors = pose_errors_since(0.0, moved, truth, truth.times[::10])
     assert np.abs(errors).max() < 1e-9
 
 
@@ -54,7 +54,7 @@ def test_a_tilted_map_is_as_wrong_as_its_covariance_says():
         geometry.rotate(geometry.exp(tilt), truth.positions),
         geometry.multiply(geometry.exp(tilt), truth.quats_xyzw),
     )
-    errors = pose_errors_from_start(moved, truth, truth.times[::10])
+    errors = pose_errors_since(0.0, moved, truth, truth.times[::10])
     small = np.tile(1e-14 * np.eye(6), (11, 1, 1))
     doubt = levelled_covariances(small, truth.positions[::10], np.array([1e-4, 1e-4]))
     assert nees(errors, doubt) == pytest.approx(np.ones(11), rel=0.05)

@@ -35,6 +35,8 @@ if TYPE_CHECKING:
 
 # More of the sweeps than this are worth a sentence.
 FEW = 0.02
+# So long a weakness is, s: a lidar that turns looks elsewhere before.
+WEAK = 3.0
 # Seconds without inertial samples that are.
 BLIND = 0.3
 
@@ -135,12 +137,25 @@ def _warnings(windows: list[dict[str, Any]], blind: float) -> list[str]:
             f"{len(lost)} of {len(windows)} sweeps match too little of what was seen before (first "
             f"at {lost[0]:.1f} s): the IMU alone carries the estimate there"
         )
-    weak = [w["time"] for w in windows if w["registered"] and w["degenerate"]]
-    if len(weak) > FEW * len(windows):
+    start, stop = _longest_weakness(windows)
+    if stop - start > WEAK:
         sentences.append(
-            f"{len(weak)} of {len(windows)} sweeps see too little in some direction (first at "
-            f"{weak[0]:.1f} s): the IMU carries the estimate there"
+            f"from {start:.1f} to {stop:.1f} s the sweeps see too little in some direction: the IMU "
+            "carries the estimate there"
         )
     if blind > BLIND:
         sentences.append(f"{blind:.2f} s have no inertial data: the motion went on as before there")
     return sentences
+
+
+def _longest_weakness(windows: list[dict[str, Any]]) -> tuple[float, float]:
+    """Return first and last time of the longest stretch of degenerate sweeps."""
+    longest, since = (0.0, 0.0), None
+    for w in windows:
+        if not (w["registered"] and w["degenerate"]):
+            since = None
+            continue
+        since = w["time"] if since is None else since
+        if w["time"] - since > longest[1] - longest[0]:
+            longest = since, w["time"]
+    return longest

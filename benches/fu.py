@@ -142,7 +142,9 @@ def main() -> None:
     options = parser.parse_args()
     low, high = nees_bounds(len(options.seeds), 6)
     low3, high3 = nees_bounds(len(options.seeds), 3)
-    print(f"NEES of honest poses: 6 ({low:.2f} to {high:.2f}), positions: 3 ({low3:.2f} to {high3:.2f})\n")
+    print(
+        f"NEES of honest poses: 6 ({low:.2f} to {high:.2f}), positions: 3 ({low3:.2f} to {high3:.2f})\n"
+    )
     print(f"| {' | '.join(COLUMNS)} |\n|{'---|' * len(COLUMNS)}")
     chosen = [c for c in cases(options.rate) if any(c.name.startswith(n) for n in options.only)]
     with tempfile.TemporaryDirectory() as scratch:

@@ -47,7 +47,7 @@ pub(crate) struct Cells<S> {
     size: f64,
     memory: Memory,
     places: FxHashMap<u64, u32>,
-    cells: Vec<Cell>,
+    held: Vec<Cell>,
     /// One per cell, apart from it because the search reads nothing else.
     shapes: Vec<Option<S>>,
     /// What `insert` was told when the cell got its shape.
@@ -60,7 +60,7 @@ impl<S: Shape> Cells<S> {
             size,
             memory,
             places: FxHashMap::default(),
-            cells: Vec::new(),
+            held: Vec::new(),
             shapes: Vec::new(),
             births: Vec::new(),
         }
@@ -93,7 +93,7 @@ impl<S: Shape> Cells<S> {
         touched.sort_unstable();
         touched.dedup();
         for i in touched {
-            let cell = &self.cells[i as usize];
+            let cell = &self.held[i as usize];
             let shape = S::of(&cell.moments(), &cell.middle, self.size, sigma);
             if self.shapes[i as usize].is_none() {
                 self.births[i as usize] = birth;
@@ -106,10 +106,10 @@ impl<S: Shape> Cells<S> {
     fn add(&mut self, p: &Vector3<f64>) -> (Option<u32>, bool) {
         let key = key(&(*p).into(), 1.0 / self.size);
         let Some(&place) = self.places.get(&key) else {
-            let place = self.cells.len() as u32;
+            let place = self.held.len() as u32;
             let middle = p.map(|c| ((c / self.size).floor() + 0.5) * self.size);
             self.places.insert(key, place);
-            self.cells.push(Cell {
+            self.held.push(Cell {
                 key,
                 middle,
                 before: None,
@@ -120,7 +120,7 @@ impl<S: Shape> Cells<S> {
             return (Some(place), true);
         };
         let is_new = self.shapes[place as usize].is_none();
-        let cell = &mut self.cells[place as usize];
+        let cell = &mut self.held[place as usize];
         let local = (p - cell.middle).into();
         match self.memory {
             Memory::First(most) if cell.now.n() >= most && !is_new => return (None, false),
@@ -136,16 +136,16 @@ impl<S: Shape> Cells<S> {
 
     /// Keeps only the voxels within `radius`, m, of `centre`.
     pub(crate) fn keep_within(&mut self, centre: &Vector3<f64>, radius: f64) {
-        let near: Vec<bool> = (self.cells.iter())
+        let near: Vec<bool> = (self.held.iter())
             .map(|c| (c.middle - centre).norm_squared() <= radius * radius)
             .collect();
         let mut kept = near.iter();
-        self.cells.retain(|_| *kept.next().unwrap_or(&false));
+        self.held.retain(|_| *kept.next().unwrap_or(&false));
         let mut kept = near.iter();
         self.shapes.retain(|_| *kept.next().unwrap_or(&false));
         let mut kept = near.iter();
         self.births.retain(|_| *kept.next().unwrap_or(&false));
-        let places = self.cells.iter().enumerate();
+        let places = self.held.iter().enumerate();
         self.places = places.map(|(i, c)| (c.key, i as u32)).collect();
     }
 }

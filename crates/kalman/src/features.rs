@@ -110,7 +110,7 @@ fn walk(sweep: &Sweep<'_>, ring: &[u32], sigma: f64, found: &mut Features) {
         .iter()
         .map(|&i| sweep.points[i as usize].into())
         .collect();
-    let ranges: Vec<f64> = points.iter().map(|p| p.norm()).collect();
+    let ranges: Vec<f64> = points.iter().map(Vector3::norm).collect();
     let mut begin = 0;
     for k in 1..=ring.len() {
         let near_in_time = k < ring.len() && time(k) - time(k - 1) <= MAX_MISSED * firing;

@@ -14,7 +14,15 @@ if TYPE_CHECKING:
     from bentwing.estimators.interface import Estimator
     from bentwing.recording import Payload
 
-__all__ = ["AVAILABLE_ESTIMATORS", "ESTIMATORS", "Continuous", "Kalman", "Ndt", "create", "require_estimator"]
+__all__ = [
+    "AVAILABLE_ESTIMATORS",
+    "ESTIMATORS",
+    "Continuous",
+    "Kalman",
+    "Ndt",
+    "create",
+    "require_estimator",
+]
 
 ESTIMATORS = ("continuous", "kalman", "ndt")
 AVAILABLE_ESTIMATORS = ESTIMATORS

@@ -62,7 +62,9 @@ def levelled_covariances(
     levelled = covariances.copy()
     for axis, std in enumerate(gravity_std):
         direction = np.eye(3)[axis]
-        effect = np.hstack([np.tile(direction, (len(positions), 1)), np.cross(direction, positions)])
+        effect = np.hstack(
+            [np.tile(direction, (len(positions), 1)), np.cross(direction, positions)]
+        )
         levelled += std**2 * effect[:, :, None] * effect[:, None, :]
     return levelled
 
@@ -79,5 +81,7 @@ def nees_bounds(n_runs: int, dimension: int) -> tuple[float, float]:
     The sum is χ² with `n_runs · dimension` degrees of freedom; its quantiles by Wilson and Hilferty.
     """
     n = float(n_runs * dimension)
-    low, high = (n * (1 - 2 / (9 * n) + z * np.sqrt(2 / (9 * n))) ** 3 for z in (-_QUANTILE, _QUANTILE))
+    low, high = (
+        n * (1 - 2 / (9 * n) + z * np.sqrt(2 / (9 * n))) ** 3 for z in (-_QUANTILE, _QUANTILE)
+    )
     return float(low / n_runs), float(high / n_runs)

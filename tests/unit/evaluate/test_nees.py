@@ -39,7 +39,7 @@ def test_a_shifted_and_turned_copy_has_no_error():
     turn = geometry.exp(np.array([[0.0, 0.0, 1.3]]))
     moved = Trajectory(
         truth.times,
-        geometry.rotate(turn, truth.positions) + [1.0, 2.0, 3.0],
+        geometry.rotate(turn, truth.positions) + np.array([1.0, 2.0, 3.0]),
         geometry.multiply(turn, truth.quats_xyzw),
     )
     errors = pose_errors_since(0.0, moved, truth, truth.times[::10])

@@ -36,7 +36,7 @@ SLOW = np.r_[9:31]
 # Of the velocity at rest and in motion, m/s.
 REST_SPEED, MOVING_SPEED = 0.01, 1.0
 # What one feature says beside its neighbours on the same surface, whose errors it shares.
-INDEPENDENCE = 0.2
+INDEPENDENCE = 0.25
 # Features after which a voxel is known.
 CELL_POINTS = 300
 # Least distance between the features of an update, m.

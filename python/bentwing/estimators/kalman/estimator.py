@@ -22,8 +22,8 @@ from bentwing.estimators.kalman.core import (
 from bentwing.estimators.kalman.filter_pass import MIN_POINTS, FilterPass
 from bentwing.estimators.kalman.outcome import estimate_of
 from bentwing.estimators.kalman.settings import KalmanSettings
-from bentwing.estimators.mount import FixedMount, Mount, MotorMount, Pose, described_mount
-from bentwing.estimators.planar import refuse_plane, refuse_planar_kind
+from bentwing.estimators.mount import FixedMount, MotorMount, Mount, Pose, described_mount
+from bentwing.estimators.planar import refuse_planar_kind, refuse_plane
 from bentwing.estimators.segments import MAX_IMU_GAP, extrapolated, heading
 from bentwing.estimators.start import find_start
 
@@ -217,7 +217,9 @@ class Kalman:
         level = np.array(state.pose[1])
         turn = heading(geometry.multiply(quat, geometry.inverse(level)))
         placed = at.tolist(), geometry.multiply(turn, level).tolist()
-        return replace(before.slow_state(state), pose=placed), before.slow_covariance(covariance, 1.0)
+        return replace(before.slow_state(state), pose=placed), before.slow_covariance(
+            covariance, 1.0
+        )
 
     def _first_angle(self, first: float) -> float:
         angles = self._buffer.lidar(first, first + 1.0).angles

@@ -110,9 +110,7 @@ class FilterPass:
             now.encoder_delay,
         )
 
-    def slow_covariance(
-        self, start: NDArray[np.float64], growth: float
-    ) -> NDArray[np.float64]:
+    def slow_covariance(self, start: NDArray[np.float64], growth: float) -> NDArray[np.float64]:
         """Return `start` (31, 31) with what is known of the slow states now, `growth` times as uncertain."""
         covariance = start.copy()
         covariance[SLOW, :] = covariance[:, SLOW] = 0.0
@@ -158,5 +156,3 @@ def _joined(parts: list[Poses]) -> Trajectory:
         return Trajectory(np.zeros(0), np.zeros((0, 3)), np.zeros((0, 4)))
     times, positions, quats = zip(*parts, strict=True)
     return Trajectory(np.concatenate(times), np.concatenate(positions), np.concatenate(quats))
-
-

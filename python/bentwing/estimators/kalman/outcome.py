@@ -115,9 +115,7 @@ def calibration_of(done: FilterPass, mount: Mount) -> Calibration:
     )
 
 
-def _across(
-    covariance: NDArray[np.float64], axis: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _across(covariance: NDArray[np.float64], axis: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the standard deviations (2,) across the motor's axis."""
     pair = np.linalg.svd(axis[None])[2][1:]
     return np.asarray(np.sqrt(np.maximum(np.diag(pair @ covariance @ pair.T), 0.0)))

@@ -26,7 +26,7 @@ from bentwing.estimators.ndt.outcome import (
 )
 from bentwing.estimators.ndt.scans import Scan
 from bentwing.estimators.ndt.settings import NdtSettings
-from bentwing.estimators.planar import refuse_plane, refuse_planar_kind
+from bentwing.estimators.planar import refuse_planar_kind, refuse_plane
 from bentwing.recording.batches import ImuBatch
 
 if TYPE_CHECKING:

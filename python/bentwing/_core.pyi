@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bentwing.estimators.core_settings import CoreSettings
+from bentwing.estimators.kalman.core import FilterSettings, FilterState
 from bentwing.estimators.settings import SurfelSettings
 from bentwing.global_registration.matching import MatchingPlan
 from bentwing.pose_graph.graph import GravityTerms, Links
@@ -25,6 +26,8 @@ __all__ = [
     "GlobalRegistration",
     "Globals",
     "Imu",
+    "KalmanFilter",
+    "KalmanSweep",
     "LazCompressor",
     "NdtReference",
     "NdtRegistration",
@@ -47,6 +50,9 @@ __version__: str
 _Vector: TypeAlias = Sequence[float] | NDArray[np.float64]
 _Transform: TypeAlias = tuple[_Vector, _Vector]
 """Translation (3,) m and unit quaternion (4,)."""
+_Returned: TypeAlias = tuple[list[float], list[float]]
+"""The same as it is returned."""
+_Poses: TypeAlias = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
 
 @final
 class LazCompressor:
@@ -589,6 +595,174 @@ def solve_pose_graph(
     ------
     SingularSystemError, DivergedError
     """
+
+@final
+class KalmanFilter:
+    """Error-state iterated Kalman filter with a local map (Fu 2023); runs on the caller's thread.
+
+    The order of the tangent, by which the covariance is read: attitude, position, velocity, biases of
+    gyro and accelerometer (3 each), gravity (2), rotation and translation of the motor in the IMU
+    frame and of the lidar behind it (3 each), latency, encoder delay.
+
+    Parameters
+    ----------
+    time : s, of the state
+    covariance : (31, 31), zeros for what is known exactly
+    """
+
+    def __new__(
+        cls,
+        settings: FilterSettings,
+        *,
+        time: float,
+        state: FilterState,
+        covariance: NDArray[np.float64],
+    ) -> KalmanFilter: ...
+    def propagate(
+        self,
+        times: NDArray[np.float64],
+        gyro: NDArray[np.float64],
+        accel: NDArray[np.float64],
+        *,
+        until: float,
+    ) -> None:
+        """Carry the state on to `until` by samples around that time; beyond the last its values go on.
+
+        Parameters
+        ----------
+        times, gyro, accel : (M,) s, (M, 3) rad/s and m/s², imu frame
+        """
+
+    def update(
+        self,
+        points: NDArray[np.float64],
+        times: NDArray[np.float64],
+        *,
+        rings: NDArray[np.uint16] | None = None,
+        angles: NDArray[np.float64] | None = None,
+    ) -> KalmanSweep:
+        """Correct the state by a sweep that ends about now, and add the sweep to the map.
+
+        Parameters
+        ----------
+        points : (N, 3) float64, m, lidar frame
+        times : (N,) float64, s, lidar clock
+        rings : (N,) beam numbers; without them each point is a feature
+        angles : (N,) rad, of the motor
+
+        Raises
+        ------
+        DivergedError
+        """
+
+    def release(self) -> None:
+        """Hand out the poses since the last update without a correction."""
+
+    def take_poses(self) -> _Poses:
+        """Return times (N,), positions (N, 3) and quaternions (N, 4) that were not returned before."""
+
+    def take_odometry(self) -> tuple[_Poses, _Poses]:
+        """Return the same of the high-rate odometry, raw and smoothed."""
+
+    @property
+    def time(self) -> float:
+        """Of the state, s."""
+
+    @property
+    def pose(self) -> _Returned:
+        """Of the IMU in the map."""
+
+    @property
+    def velocity(self) -> list[float]:
+        """(3,) m/s, map frame."""
+
+    @property
+    def gyro_bias(self) -> list[float]:
+        """(3,) rad/s."""
+
+    @property
+    def accel_bias(self) -> list[float]:
+        """(3,) m/s²."""
+
+    @property
+    def gravity(self) -> list[float]:
+        """(3,) m/s², map frame, upwards."""
+
+    @property
+    def base(self) -> _Returned:
+        """Of the motor in the IMU frame, or of the lidar that is fixed."""
+
+    @property
+    def lidar(self) -> _Returned:
+        """Of the lidar in the frame that the motor turns."""
+
+    @property
+    def latency(self) -> float:
+        """Lidar stamps minus IMU clock, s."""
+
+    @property
+    def encoder_delay(self) -> float:
+        """The encoder's angle at a stamp of the lidar is that of this much earlier, s."""
+
+    @property
+    def covariance(self) -> NDArray[np.float64]:
+        """(31, 31), the map taken as exact."""
+
+    @property
+    def pose_covariance(self) -> NDArray[np.float64]:
+        """(6, 6) of attitude and position, with that of the map they are in."""
+
+@final
+class KalmanSweep:
+    """What became of a sweep."""
+
+    @property
+    def matched(self) -> bool:
+        """Whether enough of it matched the map to correct the state."""
+
+    @property
+    def n_features(self) -> list[int]:
+        """Planar features and edges."""
+
+    @property
+    def n_planes(self) -> int:
+        """In the map, on all levels."""
+
+    @property
+    def new_share(self) -> float:
+        """Share of the planar features in voxels without a plane."""
+
+    @property
+    def blind(self) -> float:
+        """Seconds since the last sweep without inertial samples."""
+
+    @property
+    def n_matches(self) -> list[int]:
+        """Features with a plane or a line, and of these with a line."""
+
+    @property
+    def inlier_share(self) -> float:
+        """Share of the matches within two standard deviations."""
+
+    @property
+    def residual_rms(self) -> float:
+        """Weighted root mean square of the residuals in standard deviations."""
+
+    @property
+    def rmse(self) -> float:
+        """Weighted root mean square of the residuals, m."""
+
+    @property
+    def n_iterations(self) -> int:
+        """Solutions of the update."""
+
+    @property
+    def converged(self) -> bool:
+        """Whether the last step was short enough."""
+
+    @property
+    def eigenvalues(self) -> list[list[float]]:
+        """Of the information about translation and rotation, (3,) each, shares of their sum, increasing."""
 
 @final
 class NdtReference:

@@ -83,7 +83,6 @@ def test_version_is_one_line(capsys):
         (["map", "a.bag", "-o", "out", "--threads", "none"], "--threads"),
         (["map", "a.bag", "-o", "out", "--threads", "0"], "--threads"),
         (["map", "a.bag", "-o", "out", "--start", "-1"], "--start"),
-        (["map", "a.bag", "-o", "out", "--estimator", "kalman"], "not in this version"),
         (["map", "a.bag", "-o", "out", "--estimator", "magic"], "'magic' is not known"),
         (["map", "a.bag", "-o", "out", "--map-format", "obj"], "'obj' is not known"),
     ],

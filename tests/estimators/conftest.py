@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
 """What every estimator is fed in its contract: the first seconds of a flight through an office.
 
-NDT odometry cannot register the single planes of a 2D scanner: it is given a VLP-16 instead.
+NDT odometry and the Kalman filter cannot register the single planes of a 2D scanner: they are given a
+VLP-16 instead.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from types import SimpleNamespace
 import pytest
 
 from bentwing import estimators
+from bentwing.estimators.kalman import KalmanSettings
 from bentwing.estimators.ndt import NdtSettings
 from bentwing.estimators.settings import ContinuousSettings
 from bentwing.preprocess import preprocess
@@ -24,9 +26,10 @@ THINNING = 3  # every third point, for speed
 # Settings that make each estimator quick and still go through all of its parts.
 QUICK = {
     "continuous": ContinuousSettings(window=3.0, registration={"max_outer": 2}),
+    "kalman": KalmanSettings(rehearsal=6.0),
     "ndt": NdtSettings(max_points=1000),
 }
-HEADS = {"continuous": "hokuyo-spin", "ndt": "vlp16-fixed"}
+HEADS = {"continuous": "hokuyo-spin", "kalman": "vlp16-fixed", "ndt": "vlp16-fixed"}
 
 
 @pytest.fixture(scope="session")

@@ -2,7 +2,6 @@
 //! The normal distribution of the surface in one voxel.
 
 use bentwing_surfels::{Moments, sym3};
-use bentwing_trajectory::so3;
 use nalgebra::{Matrix3, Vector3};
 
 /// A voxel with fewer points says nothing.
@@ -47,7 +46,7 @@ impl Gaussian {
             return None;
         }
         let covariance = moments.covariance();
-        let (values, axes) = eigen(&covariance);
+        let (values, axes) = sym3::axes(&covariance);
         let wide = (MIN_WIDTH * size).powi(2);
         if values[1] < wide {
             return None;
@@ -65,17 +64,6 @@ impl Gaussian {
             sharpest: gains[0],
         })
     }
-}
-
-/// Eigenvalues in increasing order, and their eigenvectors.
-fn eigen(a: &Matrix3<f64>) -> ([f64; 3], [Vector3<f64>; 3]) {
-    let e = sym3::eigen(a);
-    let [u, v] = so3::orthogonal_pair(&e.normal);
-    // Across the first eigenvector the matrix is 2 × 2.
-    let (uu, uv, vv) = (u.dot(&(a * u)), u.dot(&(a * v)), v.dot(&(a * v)));
-    let (sin, cos) = (0.5 * (2.0 * uv).atan2(uu - vv)).sin_cos();
-    let (largest, middle) = (u * cos + v * sin, v * cos - u * sin);
-    (e.values, [e.normal, middle, largest])
 }
 
 #[cfg(test)]
@@ -100,19 +88,6 @@ mod tests {
     }
 
     proptest! {
-        #[test]
-        fn eigenvectors_rebuild_the_matrix(
-            l1 in 1e-4..1e-2_f64, f2 in 1.5..20.0_f64, f3 in 1.5..20.0_f64,
-            a in -3.0..3.0_f64, b in -3.0..3.0_f64, c in -3.0..3.0_f64,
-        ) {
-            let diagonal = Vector3::new(l1, l1 * f2, l1 * f2 * f3);
-            let R = UnitQuaternion::from_euler_angles(a, b, c).to_rotation_matrix().into_inner();
-            let m = R * Matrix3::from_diagonal(&diagonal) * R.transpose();
-            let (values, axes) = eigen(&m);
-            let rebuilt: Matrix3<f64> = (0..3).map(|i| axes[i] * axes[i].transpose() * values[i]).sum();
-            prop_assert!((rebuilt - m).norm() < 1e-9 * m.norm());
-        }
-
         #[test]
         fn a_tilted_plane_gives_information_along_its_normal_alone(a in -3.0..3.0_f64, b in -3.0..3.0_f64) {
             let R = UnitQuaternion::from_euler_angles(a, b, 0.0);

@@ -2,12 +2,12 @@
 //! One level of voxels.
 
 use bentwing_surfels::Moments;
+use bentwing_surfels::voxel::key;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
 use crate::gaussian::{Gaussian, Shape};
-use crate::voxel::key;
 
 /// Cells per parallel task; fixed, so that results do not depend on the number of threads.
 const CHUNK: usize = 512;

@@ -7,10 +7,7 @@ mod grid;
 mod reference;
 mod register;
 mod score;
-mod thin;
-mod voxel;
 
 pub use gaussian::Shape;
 pub use reference::Reference;
 pub use register::{Expectation, NdtError, Registration, register};
-pub use thin::thin;

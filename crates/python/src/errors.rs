@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The one place that releases the GIL, and the one that turns Rust errors into Python's.
 
+use bentwing_kalman::KalmanError;
 use bentwing_ndt::NdtError;
 use bentwing_pose_graph::GraphError;
 use bentwing_registration::SolveError;
@@ -60,6 +61,11 @@ pub(crate) fn ndt_error(py: Python<'_>, error: &NdtError) -> PyErr {
         _ => "EstimationError",
     };
     raised(py, name, &error.to_string())
+}
+
+/// The Python exception for a filter that cannot go on.
+pub(crate) fn kalman_error(py: Python<'_>, error: &KalmanError) -> PyErr {
+    raised(py, "DivergedError", &error.to_string())
 }
 
 /// An exception of `bentwing.errors`.

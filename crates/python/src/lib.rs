@@ -11,6 +11,7 @@ use pyo3::prelude::*;
 mod arrays;
 mod errors;
 mod global;
+mod kalman;
 mod laz;
 mod ndt;
 mod pose_graph;
@@ -25,6 +26,8 @@ mod _core {
 
     #[pymodule_export]
     use crate::global::{GlobalRegistration, Piece, register_globally};
+    #[pymodule_export]
+    use crate::kalman::{KalmanFilter, KalmanSweep};
     #[pymodule_export]
     use crate::laz::LazCompressor;
     #[pymodule_export]

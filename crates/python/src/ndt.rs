@@ -205,5 +205,8 @@ pub(crate) fn thin_points<'py>(
 ) -> PyResult<Bound<'py, PyArray1<usize>>> {
     let points = finite_rows("points", &points)?;
     let spacing = positive("spacing", finite_number("spacing", spacing)?)?;
-    Ok(crate::errors::detached(py, || core::thin(points, spacing, most)).into_pyarray(py))
+    Ok(
+        crate::errors::detached(py, || bentwing_surfels::thin(points, spacing, most))
+            .into_pyarray(py),
+    )
 }

@@ -7,8 +7,11 @@ mod moments;
 mod place;
 mod surfel;
 pub mod sym3;
+mod thin;
+pub mod voxel;
 
 pub use extract::{Points, Settings, extract};
 pub use moments::Moments;
 pub use place::place_points;
 pub use surfel::SurfelSet;
+pub use thin::thin;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Symmetric 3×3 matrices and their closed-form eigendecomposition.
 
+use bentwing_trajectory::so3;
 use nalgebra::{Matrix3, Vector3};
 
 /// Eigenvalues in increasing order and the unit eigenvector of the smallest one.
@@ -35,6 +36,17 @@ pub fn eigen(a: &Matrix3<f64>) -> Eigen {
     }
 }
 
+/// Eigenvalues in increasing order, and their eigenvectors.
+pub fn axes(a: &Matrix3<f64>) -> ([f64; 3], [Vector3<f64>; 3]) {
+    let e = eigen(a);
+    let [u, v] = so3::orthogonal_pair(&e.normal);
+    // Across the first eigenvector the matrix is 2 × 2.
+    let (uu, uv, vv) = (u.dot(&(a * u)), u.dot(&(a * v)), v.dot(&(a * v)));
+    let (sin, cos) = (0.5 * (2.0 * uv).atan2(uu - vv)).sin_cos();
+    let (largest, middle) = (u * cos + v * sin, v * cos - u * sin);
+    (e.values, [e.normal, middle, largest])
+}
+
 /// Unit vector in the null space of `a − λ`: the longest cross product of two of its rows.
 fn null_vector(a: &Matrix3<f64>, lambda: f64) -> Vector3<f64> {
     let m = a - Matrix3::from_diagonal_element(lambda);
@@ -60,6 +72,19 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
+        #[test]
+        fn eigenvectors_rebuild_the_matrix(
+            l1 in 1e-4..1e-2_f64, f2 in 1.5..20.0_f64, f3 in 1.5..20.0_f64,
+            a in -3.0..3.0_f64, b in -3.0..3.0_f64, c in -3.0..3.0_f64,
+        ) {
+            let diagonal = Vector3::new(l1, l1 * f2, l1 * f2 * f3);
+            let R = UnitQuaternion::from_euler_angles(a, b, c).to_rotation_matrix().into_inner();
+            let m = R * Matrix3::from_diagonal(&diagonal) * R.transpose();
+            let (values, vectors) = axes(&m);
+            let rebuilt: Matrix3<f64> = (0..3).map(|i| vectors[i] * vectors[i].transpose() * values[i]).sum();
+            prop_assert!((rebuilt - m).norm() < 1e-9 * m.norm());
+        }
+
         #[test]
         fn values_and_normal_of_a_rotated_ellipsoid_are_found(
             l1 in 1e-5..1e-2_f64, f2 in 1.5..50.0_f64, f3 in 1.0..50.0_f64,

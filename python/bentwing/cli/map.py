@@ -19,7 +19,10 @@ def map_command(
         Path | None, typer.Option(help="payload.yaml, the description of the sensor head.")
     ] = None,
     estimator: Annotated[
-        str, typer.Option(help="continuous, or ndt for 3D lidars without an IMU.")
+        str,
+        typer.Option(
+            help="continuous; kalman for 3D lidars, faster; ndt for 3D lidars without an IMU."
+        ),
     ] = "continuous",
     map_format: Annotated[str, typer.Option(help="laz, las, ply, pcd or e57.")] = "laz",
     map_spacing: Annotated[

@@ -31,6 +31,7 @@ class LidarStretch:
     points: NDArray[np.float64]
     times: NDArray[np.float64]
     angles: NDArray[np.float64] | None
+    rings: NDArray[np.uint16] | None = None
 
 
 class BatchBuffer:
@@ -86,7 +87,9 @@ class BatchBuffer:
         points = np.concatenate([b.points for b in parts])[keep]
         angles = [b.angles for b in parts if b.angles is not None]
         joined = np.concatenate(angles)[keep] if len(angles) == len(parts) else None
-        return LidarStretch(np.ascontiguousarray(points), times[keep], joined)
+        rings = [b.ring for b in parts if b.ring is not None]
+        numbers = np.concatenate(rings)[keep] if len(rings) == len(parts) else None
+        return LidarStretch(np.ascontiguousarray(points), times[keep], joined, numbers)
 
     def imu(self, start: float, stop: float) -> ImuBatch:
         """Return the inertial samples with stamps in `[start, stop)`."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bentwing import geometry
-from bentwing.errors import NotEnoughDataError, PayloadError
+from bentwing.errors import NotEnoughDataError
 from bentwing.estimators.buffer import BatchBuffer
 from bentwing.estimators.core_states import core_globals
 from bentwing.estimators.interface import Estimate
@@ -26,6 +26,7 @@ from bentwing.estimators.ndt.outcome import (
 )
 from bentwing.estimators.ndt.scans import Scan
 from bentwing.estimators.ndt.settings import NdtSettings
+from bentwing.estimators.planar import refuse_planar_kind, refuse_plane
 from bentwing.recording.batches import ImuBatch
 
 if TYPE_CHECKING:
@@ -39,8 +40,6 @@ MIN_POINTS = 200
 LOST_AFTER = 1.0
 # Batches that end within this time before the last scan are held, s.
 HELD = 1.0
-# 2D scanners, which show single planes.
-PLANAR_KINDS = ("hokuyo-utm30lx",)
 
 
 class Ndt:
@@ -59,12 +58,7 @@ class Ndt:
         self, payload: Payload, settings: NdtSettings | None = None, threads: int | None = None
     ) -> None:
         lidar = payload.lidar
-        if lidar.kind in PLANAR_KINDS:
-            msg = (
-                f"lidar.kind: {lidar.kind} is a 2D lidar, whose scans are single planes that NDT "
-                "odometry cannot register; use --estimator continuous"
-            )
-            raise PayloadError(msg)
+        refuse_planar_kind(payload, "NDT odometry")
         self.settings = settings or NdtSettings()
         self._has_imu = payload.imu is not None
         self._mount = described_mount(payload)
@@ -167,7 +161,7 @@ class Ndt:
             raise ValueError(msg)
         scan = Scan.of(returns)
         if not self._tracks:
-            scan.require_more_than_a_plane()
+            refuse_plane(scan.points, "NDT odometry")
             self._begin(scan, Placed(scan.time, np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0])))
         else:
             self._follow(scan, stop)

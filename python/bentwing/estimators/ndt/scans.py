@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bentwing import _core, geometry
-from bentwing.errors import NotEnoughDataError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -19,8 +18,6 @@ if TYPE_CHECKING:
 
 # Between these the motion is straight, s.
 STEP = 0.01
-# Of a scan's extents in the lidar frame; a plane has none in one direction.
-FLAT = 1e-4
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,19 +59,3 @@ class Scan:
             start, STEP, since[:, None] * twist.v, geometry.exp(since[:, None] * twist.omega)
         )
         return motion.place(self.points, self.times, self.angles, head, threads=threads)
-
-    def require_more_than_a_plane(self) -> None:
-        """Refuse the scan of a 2D lidar.
-
-        Raises
-        ------
-        NotEnoughDataError
-            If all points lie in one plane of the lidar frame, as those of a 2D scanner.
-        """
-        extents = np.linalg.svd(self.points - self.points.mean(axis=0), compute_uv=False)
-        if len(self.points) >= 3 and extents[2] < FLAT * extents[0]:
-            msg = (
-                f"the {len(self.points)} points of the first scan lie in one plane, those of a 2D "
-                "lidar: NDT odometry cannot register single planes, use --estimator continuous"
-            )
-            raise NotEnoughDataError(msg)

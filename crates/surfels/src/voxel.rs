@@ -5,9 +5,9 @@
 const BITS: u32 = 21;
 const MASK: u64 = (1 << BITS) - 1;
 
-/// Key of the voxel of `p`; voxels a million edges apart in a direction share one.
+/// Key of the voxel of `p`, `per_metre` being one over its edge; voxels a million edges apart in a direction share one.
 #[inline]
-pub(crate) fn key(p: &[f64; 3], per_metre: f64) -> u64 {
+pub fn key(p: &[f64; 3], per_metre: f64) -> u64 {
     let [x, y, z] = p.map(|c| (c * per_metre).floor() as i64 as u64 & MASK);
     x << (2 * BITS) | y << BITS | z
 }

@@ -1,0 +1,173 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""Table 2 of Fu 2023: the Kalman filter with a turning lidar, with a fixed one, and with the rotation
+ignored, beside `continuous`; on simulated recordings of the seeds given.
+
+Per scene: mean and RMSE of the ATE over all poses, real-time factor and processor seconds of the
+estimate stage (reading included), and whether the errors are as large as stated (NEES).
+"""
+
+from __future__ import annotations
+
+import argparse
+import resource
+import statistics
+import tempfile
+import time
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scoring import in_flight
+
+from bentwing import estimators
+from bentwing.errors import BentwingError
+from bentwing.estimators.kalman import KalmanSettings
+from bentwing.estimators.settings import ContinuousSettings
+from bentwing.evaluate.nees import levelled_covariances, nees, nees_bounds, pose_errors_since
+from bentwing.evaluate.trajectory import absolute_error
+from bentwing.preprocess import preprocess
+from bentwing.recording import Payload, Recording
+from bentwing.simulate import Scenario, simulate
+from bentwing.trajectory import read_tum
+
+FAILED = 2.0  # m, of ATE: the estimate has left the way
+COLUMNS = (
+    "scene", "algorithm", "runs", "failed", "ATE mean, m", "ATE RMSE, m", "worst, m", "way, m",
+    "times real time", "CPU s per s", "NEES pose (end)", "NEES position (end)",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Case:
+    """An algorithm on a head."""
+
+    name: str
+    estimator: str
+    head: str
+    settings: object
+    rate: float = 6.2832
+
+
+def cases(rate: float) -> list[Case]:
+    """The rows of the table for a motor that turns at `rate`, rad/s."""
+    motor = "vlp16-motor"
+    return [
+        Case(f"kalman, {rate:g} rad/s", "kalman", motor, KalmanSettings(), rate),
+        Case("R-FAST-LIO: rotation ignored", "kalman", motor, KalmanSettings(rotation="ignored"), rate),
+        Case("F-FAST-LIO: fixed", "kalman", "vlp16-fixed", KalmanSettings()),
+        Case(f"continuous, {rate:g} rad/s", "continuous", motor, ContinuousSettings(), rate),
+    ]  # fmt: skip
+
+
+def run(case: Case, folder: Path, threads: int) -> dict:
+    """Estimate a recording and compare it with its truth."""
+    payload = Payload.load(folder / "payload.yaml")
+    engine = estimators.create(case.estimator, payload, case.settings, threads)
+    with Recording(folder / "recording.bag", payload) as recording:
+        truth, _ = read_tum(folder / "truth_trajectory.txt", recording.clock.start_ns)
+        before, began = _processor_seconds(), time.perf_counter()
+        try:
+            for batch in preprocess(recording.batches(), payload, Counter()):
+                engine.feed(batch)
+            estimate = engine.result()
+        except BentwingError as error:
+            return {"failed": True, "why": str(error)}
+        wall, cpu = time.perf_counter() - began, _processor_seconds() - before
+        length = recording.duration
+    error = absolute_error(estimate.trajectory, truth).position
+    way = float(np.linalg.norm(np.diff(truth.positions[::20], axis=0), axis=1).sum())
+    row = {"failed": error.rmse > FAILED, "mean": error.mean, "rmse": error.rmse}
+    row |= {"worst": error.maximum, "way": way, "speed": length / wall, "cpu": cpu / length}
+    if case.estimator == "kalman" and not row["failed"]:
+        row |= consistency(engine, estimate, truth)
+    return row
+
+
+def consistency(engine, estimate, truth) -> dict:
+    """NEES of pose and position after the last sweep, and on average over the run."""
+    times, covariances = engine.pose_covariances()
+    take_off, _ = in_flight(truth)
+    inside = (times <= estimate.trajectory.times[-1]) & truth.covers(times) & (times > take_off)
+    times, covariances = times[inside], covariances[inside]
+    errors = pose_errors_since(take_off, estimate.trajectory, truth, times)
+    positions, _ = estimate.trajectory.interpolate(times)
+    std = np.array(estimate.calibration.std["gravity"])
+    doubt = levelled_covariances(covariances, positions, std)
+    pose, position = nees(errors, doubt), nees(errors[:, 3:], doubt[:, 3:, 3:])
+    return {
+        "nees": float(pose[-1]),
+        "nees_position": float(position[-1]),
+        "nees_mean": float(pose.mean()),
+        "errors": errors[-1],
+        "std": np.sqrt(np.diag(doubt[-1])),
+    }
+
+
+def _processor_seconds() -> float:
+    usage = resource.getrusage(resource.RUSAGE_SELF)
+    return usage.ru_utime + usage.ru_stime
+
+
+def line(scene: str, case: Case, rows: list[dict]) -> str:
+    """One row of the table."""
+    good = [row for row in rows if not row["failed"]]
+    n_failed = len(rows) - len(good)
+    if not good:
+        return f"| {scene} | {case.name} | {len(rows)} | {n_failed} |" + " - |" * (len(COLUMNS) - 4)
+
+    def mean(name: str, digits: int) -> str:
+        values = [row[name] for row in good if name in row]
+        return f"{statistics.fmean(values):.{digits}f}" if values else "-"
+
+    worst = max(row["worst"] for row in good)
+    cells = [
+        scene, case.name, str(len(rows)), str(n_failed), mean("mean", 4), mean("rmse", 4),
+        f"{worst:.3f}", mean("way", 0), mean("speed", 1), mean("cpu", 3), mean("nees", 1),
+        mean("nees_position", 1),
+    ]  # fmt: skip
+    return f"| {' | '.join(cells)} |"
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--scenes", nargs="+", default=["office", "courtyard"])
+    parser.add_argument("--seeds", nargs="+", type=int, default=[1, 2, 3])
+    parser.add_argument("--rate", type=float, default=6.2832, help="of the motor, rad/s")
+    parser.add_argument("--duration", type=float, default=60.0, help="s")
+    parser.add_argument("--only", nargs="+", default=[""], help="algorithms whose names begin so")
+    parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument("--each", action="store_true", help="print every run")
+    options = parser.parse_args()
+    low, high = nees_bounds(len(options.seeds), 6)
+    low3, high3 = nees_bounds(len(options.seeds), 3)
+    print(
+        f"NEES of honest poses: 6 ({low:.2f} to {high:.2f}), positions: 3 ({low3:.2f} to {high3:.2f})\n"
+    )
+    print(f"| {' | '.join(COLUMNS)} |\n|{'---|' * len(COLUMNS)}")
+    chosen = [c for c in cases(options.rate) if any(c.name.startswith(n) for n in options.only)]
+    with tempfile.TemporaryDirectory() as scratch:
+        for scene in options.scenes:
+            found: dict[str, list[dict]] = {case.name: [] for case in chosen}
+            for seed in options.seeds:
+                for head in dict.fromkeys(case.head for case in chosen):
+                    folder = Path(scratch) / f"{scene}-{head}-{seed}"
+                    scenario = Scenario(
+                        scene=scene, head=head, motor_rate=options.rate, duration=options.duration, seed=seed
+                    )  # fmt: skip
+                    simulate(scenario, folder)
+                    for case in chosen:
+                        if case.head == head:
+                            row = run(case, folder, options.threads)
+                            found[case.name].append(row)
+                            if options.each:
+                                print(f"  {scene} {seed} {case.name}: {row}", flush=True)
+                    for file in folder.iterdir():
+                        file.unlink()
+            for case in chosen:
+                print(line(scene, case, found[case.name]), flush=True)
+
+
+if __name__ == "__main__":
+    main()

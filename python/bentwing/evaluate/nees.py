@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""Whether an estimate is as uncertain as it says: normalized estimation errors squared (NEES)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bentwing import geometry
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from bentwing.trajectory import Trajectory
+
+_QUANTILE = 1.959963984540054
+"""Of the normal distribution at 97.5 %."""
+
+
+def pose_errors_since(
+    reference: float, estimate: Trajectory, truth: Trajectory, times: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Errors of an estimate that agrees with the truth at a time of reference, but for the tilt.
+
+    An odometry chooses position and heading of its frame, and measures what is up.
+
+    Parameters
+    ----------
+    reference : s, at which positions and headings agree: that of take-off
+    times : (K,) s, within both
+
+    Returns
+    -------
+    (K, 6) rotation, rad, and translation, m: `R_estimate = Exp(e) R_true`, map frame
+    """
+    at, quat = truth.interpolate(np.array([reference]))
+    there, estimated = estimate.interpolate(np.array([reference]))
+    turn = geometry.multiply(estimated, geometry.inverse(quat))
+    heading = np.array([[0.0, 0.0, turn[0, 2], turn[0, 3]]])
+    heading /= np.linalg.norm(heading)
+    positions, quats = truth.interpolate(times)
+    positions = geometry.rotate(heading, positions - at) + there
+    quats = geometry.multiply(heading, quats)
+    found, found_quats = estimate.interpolate(times)
+    turned = geometry.log(geometry.multiply(found_quats, geometry.inverse(quats)))
+    return np.hstack([turned, found - positions])
+
+
+def levelled_covariances(
+    covariances: NDArray[np.float64],
+    positions: NDArray[np.float64],
+    gravity_std: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Add to covariances (K, 6, 6) of poses what the doubt about the vertical makes of them.
+
+    Parameters
+    ----------
+    positions : (K, 3) m, map frame
+    gravity_std : (2,) rad, of the turns about x and y that levelled the map
+    """
+    levelled = covariances.copy()
+    for axis, std in enumerate(gravity_std):
+        direction = np.eye(3)[axis]
+        effect = np.hstack(
+            [np.tile(direction, (len(positions), 1)), np.cross(direction, positions)]
+        )
+        levelled += std**2 * effect[:, :, None] * effect[:, None, :]
+    return levelled
+
+
+def nees(errors: NDArray[np.float64], covariances: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return `eᵀ P⁻¹ e` (K,) of errors (K, D) and covariances (K, D, D)."""
+    solved = np.linalg.solve(covariances, errors[:, :, None])[:, :, 0]
+    return np.asarray(np.einsum("kd,kd->k", errors, solved))
+
+
+def nees_bounds(n_runs: int, dimension: int) -> tuple[float, float]:
+    """Return the bounds within which the mean over independent runs lies with 95 %.
+
+    The sum is χ² with `n_runs · dimension` degrees of freedom; its quantiles by Wilson and Hilferty.
+    """
+    n = float(n_runs * dimension)
+    low, high = (
+        n * (1 - 2 / (9 * n) + z * np.sqrt(2 / (9 * n))) ** 3 for z in (-_QUANTILE, _QUANTILE)
+    )
+    return float(low / n_runs), float(high / n_runs)

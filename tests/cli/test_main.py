@@ -109,7 +109,7 @@ def test_options_reach_the_pipeline(called, capsys):
     options.pop("progress")
     assert options == {
         "estimator": "continuous", "map_format": "ply", "map_spacing": 0.02, "loop_closure": False,
-        "threads": 2, "start": 5.0, "duration": 60.0,
+        "threads": 2, "start": 5.0, "duration": 60.0, "resume": False,
     }  # fmt: skip
     assert capsys.readouterr() == ("", "")
 

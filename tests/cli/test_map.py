@@ -280,7 +280,6 @@ def test_a_part_behind_the_end(bentwing, office, tmp_path):
     "options",
     [
         ("--estimator", "slam"),
-        ("--estimator", "kalman"),
         ("--map-format", "obj"),
         ("--threads", "0"),
         ("--threads", "many"),

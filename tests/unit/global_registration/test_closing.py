@@ -13,7 +13,9 @@ from bentwing.global_registration import GlobalSettings, close_loops
 from bentwing.recording import LidarBatch, Payload
 from bentwing.trajectory import Trajectory
 
-PAYLOAD = Payload.model_validate({"T_imu_lidar": {}})
+PAYLOAD = Payload.model_validate(
+    {"T_imu_lidar": {}, "lidar": {"range_sigma": 1e-3}}
+)  # exact points
 ROOM = np.array([[-4.0, 5.0], [-3.0, 4.0], [-1.5, 1.8]])
 SECONDS = 30.0
 LAP = 10.0

@@ -26,7 +26,7 @@ COLUMNS = (
     "map, best possible = 1", "latency", "extrinsics", "speed", "CPU per s recorded", "stages",
     "peak memory",
 )  # fmt: skip
-STAGES = ("estimate", "map", "report")
+STAGES = ("estimate", "loops", "map", "report")
 RESULTS = Path(__file__).parent / "results" / "pipeline.json"
 
 
@@ -47,7 +47,8 @@ def measure(scene: str, head: str, seed: int, options: argparse.Namespace) -> di
         recording, payload = simulated / "recording.bag", simulated / "payload.yaml"
         command = [recording, "--payload", payload, "-o", out, "--quiet"]
         threads = [] if options.threads is None else ["--threads", str(options.threads)]
-        cost = run("map", *command, *threads)
+        loops = ["--no-loop-closure"] if options.no_loop_closure else []
+        cost = run("map", *command, *threads, *loops)
         record = json.loads((out / "run.json").read_text())
         return {
             "scene": scene,
@@ -56,6 +57,7 @@ def measure(scene: str, head: str, seed: int, options: argparse.Namespace) -> di
             "duration": options.duration,
             "varied": varied(options),
             "threads": options.threads,
+            "no_loop_closure": options.no_loop_closure,
             "version": record["versions"],
             "cost": asdict(cost),
             "timings": record["timings"],
@@ -79,7 +81,9 @@ def row(result: dict) -> str:
         f"{given(found['extrinsic_rotation'], np.degrees(1.0), '°')}, "
         f"{given(found['extrinsic_translation'], 1e3, 'mm')}"
     )
-    shares = ", ".join(f"{name} {timings[name] / timings['total']:.0%}" for name in STAGES)
+    shares = ", ".join(
+        f"{name} {timings[name] / timings['total']:.0%}" for name in STAGES if name in timings
+    )
     cells = [
         result["scene"],
         result["head"],
@@ -148,6 +152,7 @@ def main() -> None:
     parser.add_argument("--motor-rate", type=float, help="of vlp16-motor, rad/s")
     parser.add_argument("--max-range", type=float, help="the lidar sees up to here, m")
     parser.add_argument("--threads", type=int, help="of the estimator; default: all cores")
+    parser.add_argument("--no-loop-closure", action="store_true", help="the odometry alone")
     parser.add_argument("--json", type=Path, default=RESULTS, help="default: %(default)s")
     options = parser.parse_args()
     scenes = [*options.positional, *options.scenes] or ["courtyard", "office"]

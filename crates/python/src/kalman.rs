@@ -328,10 +328,7 @@ impl KalmanFilter {
     }
 }
 
-fn arrays<'py>(
-    py: Python<'py>,
-    poses: impl Iterator<Item = (f64, Mounted)>,
-) -> PyResult<Poses<'py>> {
+fn arrays(py: Python<'_>, poses: impl Iterator<Item = (f64, Mounted)>) -> PyResult<Poses<'_>> {
     let (mut times, mut positions, mut quats) = (Vec::new(), Vec::new(), Vec::new());
     for (time, pose) in poses {
         let (t, q) = transform(&pose);

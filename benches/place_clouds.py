@@ -8,6 +8,7 @@ millimetres, as an estimator's do.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -103,9 +104,32 @@ class FlightKind:
 FLIGHTS = (
     FlightKind("office", ("hokuyo-spin", "vlp16-motor"), 30.0),
     FlightKind("courtyard", ("hokuyo-spin", "vlp16-fixed"), 30.0),
-    FlightKind("forest", ("hokuyo-spin", "vlp16-motor"), 30.0),
+    FlightKind("forest", ("hokuyo-spin",), 30.0),
     FlightKind("cave", ("hokuyo-spin",), 40.0),
     FlightKind("mine", ("hokuyo-spin",), 50.0),
     FlightKind("town", ("vlp16-motor",), 58.0),
     FlightKind("dam", ("vlp16-motor",), 30.0, "survey"),
 )
+
+
+def kept_run(scenario: Scenario, folder: Path | None) -> SimulatedRun:
+    """Return the run as kept in `folder`, or fly it, and keep it there."""
+    if folder is None:
+        return simulated_run(scenario)
+    path = folder / f"{scenario.scene}_{scenario.seed}_{(scenario.flight_seed or 0) % 100}.npz"
+    if not path.exists():
+        folder.mkdir(parents=True, exist_ok=True)
+        run = simulated_run(scenario)
+        track = run.trajectory
+        np.savez(
+            path,
+            points=run.points.astype(np.float32),
+            times=run.times,
+            tt=track.times,
+            tp=track.positions,
+            T=run.T_world_map,
+        )
+    kept = np.load(path)
+    upright = np.tile([0.0, 0.0, 0.0, 1.0], (len(kept["tt"]), 1))
+    track = Trajectory(kept["tt"], kept["tp"], upright)
+    return SimulatedRun(kept["points"].astype(np.float64), kept["times"], track, kept["T"])

@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from bentwing.places.consensus import Hypothesis, hypotheses
 from bentwing.places.metric import Metric, default_metric
-from bentwing.places.refine import Alignment, refine
+from bentwing.places.refine import COARSE, FINE, Alignment, refine
 from bentwing.places.settings import MatchSettings
 from bentwing.places.verify import Agreement, quick_score, verify
 from bentwing.places.vote import likely_pairs, vote
@@ -22,6 +22,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bentwing.places.place import Place
+
+_WORTH_REFINING = 0.6  # agreement after the coarse alignment
+_FAR = "too few surfels are near each other"
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,6 +119,8 @@ def _tried(
         tried = _judged(named, places, trees, hypothesis, settings)
         if best is None or _merit(tried) > _merit(best):
             best = tried
+        if best.accepted:
+            break
     if best is None:
         most = max((h.n_inliers for h in proposed), default=0)
         reason = f"{most} keypoints agree on a transform, {settings.min_inliers} are needed"
@@ -131,10 +136,15 @@ def _judged(
     settings: MatchSettings,
 ) -> Candidate:
     a, b = places
-    alignment = refine(a.surfels, trees[0], b.surfels, hypothesis.T_a_b)
+    alignment = refine(a.surfels, trees[0], b.surfels, hypothesis.T_a_b, COARSE)
     if alignment is None:
-        return Candidate(*named, "too few surfels are near each other", hypothesis.n_inliers)
+        return Candidate(*named, _FAR, hypothesis.n_inliers)
     agreement = verify(a, b, trees, alignment.T_a_b)
+    if agreement.agreement > _WORTH_REFINING:
+        finer = refine(a.surfels, trees[0], b.surfels, alignment.T_a_b, FINE)
+        if finer is None:
+            return Candidate(*named, _FAR, hypothesis.n_inliers)
+        alignment, agreement = finer, verify(a, b, trees, finer.T_a_b)
     reason = agreement.objection(settings) or _leaning(alignment.T_a_b)
     return Candidate(*named, reason, hypothesis.n_inliers, alignment, agreement)
 

@@ -16,12 +16,34 @@ if TYPE_CHECKING:
 
     from bentwing.places.cloud import Surfels
 
-_GATES = (1.5, 1.5, 1.5, 1.0, 1.0, 0.7, 0.7, 0.5, 0.5, 0.5, 0.5, 0.5)  # m, of the iterations
-SIGMA = 0.03  # m, isotropic, added to the surfels' own: noise, drift, and what sampling does
-_KERNEL = 2.0  # standard deviations at which Cauchy's weight is one half
-_MOST = 1500  # surfels of b that are aligned
-_UPRIGHT_UNTIL = 4  # iterations with four degrees of freedom
+SIGMA = 0.03
+"""m, isotropic, added to the surfels' own extents: noise, drift, and what sampling does."""
+_ENOUGH_PAIRS = 20
 _ENOUGH = 1e-4  # rad and m, a smaller step ends it
+
+
+@dataclass(frozen=True, slots=True)
+class Schedule:
+    """How an alignment proceeds.
+
+    Attributes
+    ----------
+    gates : m, of the iterations: surfels farther apart are no pairs
+    n_upright : iterations with four degrees of freedom, before six
+    most : surfels of b that are aligned
+    sigma : m, isotropic, added to the surfels' own extents
+    kernel : standard deviations at which Cauchy's weight is one half
+    """
+
+    gates: tuple[float, ...]
+    n_upright: int
+    most: int
+    sigma: float
+    kernel: float
+
+
+COARSE = Schedule((1.5, 1.5, 1.5, 1.0, 1.0, 0.7, 0.7, 0.5, 0.5), 4, 700, SIGMA, 2.0)
+FINE = Schedule((0.5,) * 5 + (0.4,) * 10, 0, 2000, 0.015, 1.5)
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,9 +66,9 @@ class Alignment:
 
 
 def refine(
-    a: Surfels, tree: cKDTree, b: Surfels, T_a_b: NDArray[np.float64]
+    a: Surfels, tree: cKDTree, b: Surfels, T_a_b: NDArray[np.float64], schedule: Schedule
 ) -> Alignment | None:
-    """Align the surfels of b with those of a, first upright, then in six degrees of freedom.
+    """Align the surfels of b with those of a.
 
     Distances are measured by the covariances of both surfels: along a plane they are free, across
     it they are sharp. None where too few surfels are near each other.
@@ -56,40 +78,41 @@ def refine(
     a, b : surfels of the places
     tree : of a's means
     T_a_b : (4, 4) to begin with
+    schedule : `COARSE` for a guess, `FINE` for what is nearly right
 
     References
     ----------
     Segal et al. 2009, Generalized-ICP.
     """
-    step = -(-len(b) // _MOST) or 1
+    step = -(-len(b) // schedule.most) or 1
     means, covariances = b.means[::step], b.covariances[::step]
-    for iteration, gate in enumerate(_GATES):
+    for iteration, gate in enumerate(schedule.gates):
         R = T_a_b[:3, :3]
         moved = apply(T_a_b, means)
         distances, nearest = tree.query(moved, distance_upper_bound=gate)
         near = np.isfinite(distances)
-        if near.sum() < 20:
+        if near.sum() < _ENOUGH_PAIRS:
             return None
         rows, columns = np.flatnonzero(near), nearest[near]
         residuals = moved[rows] - a.means[columns]
-        spread = a.covariances[columns] + R @ covariances[rows] @ R.T + SIGMA**2 * np.eye(3)
+        spread = a.covariances[columns] + R @ covariances[rows] @ R.T + schedule.sigma**2 * np.eye(3)
         weights = np.linalg.inv(spread)
         chi2 = np.einsum("ni,nij,nj->n", residuals, weights, residuals)
         # Cauchy; a kernel wide at first, when hardly any surfel is where it should be
-        kernel = max(_KERNEL, 0.5 * float(np.sqrt(np.median(chi2))))
+        kernel = max(schedule.kernel, 0.5 * float(np.sqrt(np.median(chi2))))
         weights = weights / (1.0 + chi2 / kernel**2)[:, None, None]
         about = moved[rows].mean(axis=0)
         J = _jacobians(moved[rows] - about)
         WJ = weights @ J
         information = np.einsum("nki,nkj->ij", J, WJ)
         gradient = np.einsum("nki,nk->i", WJ, residuals)
-        free = np.array([2, 3, 4, 5]) if iteration < _UPRIGHT_UNTIL else np.arange(6)
+        free = np.array([2, 3, 4, 5]) if iteration < schedule.n_upright else np.arange(6)
         delta = np.zeros(6)
         damped = information[np.ix_(free, free)]
         damped = damped + 1e-9 * np.trace(damped) * np.eye(len(free))
         delta[free] = -np.linalg.solve(damped, gradient[free])
         T_a_b = turned_and_shifted(T_a_b, delta, about)
-        if iteration >= len(_GATES) - 4 and np.abs(delta).max() < _ENOUGH:
+        if iteration >= schedule.n_upright and np.abs(delta).max() < _ENOUGH:
             break
     return Alignment(T_a_b, information, about, int(near.sum()))
 

@@ -44,6 +44,8 @@ class MatchSettings:
     min_overlap : share of the smaller place that the other one has too
     min_agreement : share of what both could see that both saw alike
     max_conflict : share of what one place saw where the other saw through
+    max_distance : m, median across the planes of surfels near each other; the least of the checks
+        to be fooled by places that are built alike, and the first to be widened for a poor sensor
     min_conditioning : least eigenvalue of the alignment's information, per surfel
     """
 
@@ -52,8 +54,9 @@ class MatchSettings:
     max_candidates: int = 8
     n_hypotheses: int = 40
     n_refined: int = 4
-    min_inliers: int = 6
+    min_inliers: int = 4
     min_overlap: float = 0.25
-    min_agreement: float = 0.7
-    max_conflict: float = 0.05
+    min_agreement: float = 0.8
+    max_conflict: float = 0.01
+    max_distance: float = 0.025
     min_conditioning: float = 0.01

@@ -26,7 +26,9 @@ _PLANAR = 0.6
 _QUICK = 300  # surfels of a quick look
 _SIMILAR = np.cos(np.radians(30.0))
 _CLOSE = 0.3  # m, across a plane
-_MIN_SURFELS = 30  # that are not flat, for shares to mean anything
+_THIN = 0.03  # m, standard deviation of a plane's points across it
+_MIN_PLANES = 30  # for their median distance to mean something
+_MIN_SURFELS = 80  # that are not flat, for shares to mean anything
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,17 +62,27 @@ class Agreement:
             return f"{self.n_alike} surfels are alike, {_MIN_SURFELS} are needed"
         for value, least, name in (
             (self.overlap, settings.min_overlap, "overlap"),
-            (self.agreement, settings.min_agreement, "agreement"),
+            (self.agreement, self._needed(settings), "agreement"),
             (self.conditioning, settings.min_conditioning, "conditioning"),
         ):
             if value < least:
                 return f"{name} is {value:.3g}, {least:g} is needed"
+        if self.distance > settings.max_distance:
+            return (
+                f"planes are {1000 * self.distance:.0f} mm apart, "
+                f"{1000 * settings.max_distance:.0f} mm are allowed"
+            )
         if self.conflict > settings.max_conflict:
             return (
                 f"{self.conflict:.1%} stand where the other place saw through, "
                 f"{settings.max_conflict:.1%} are allowed"
             )
         return None
+
+
+    def _needed(self, settings: MatchSettings) -> float:
+        """Agreement that is needed: more where there are no planes to compare sharply."""
+        return settings.min_agreement + (0.05 if np.isnan(self.distance) else 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,7 +149,7 @@ def quick_score(
 
 
 def _median(values: NDArray[np.float64]) -> float:
-    return float(np.median(values)) if len(values) else float("nan")
+    return float(np.median(values)) if len(values) >= _MIN_PLANES else float("nan")
 
 
 def _view(
@@ -162,10 +174,17 @@ def _view(
     through = np.zeros(len(moved), dtype=np.bool_)
     if place.free is not None:
         through = place.free.contains(moved) & ~alike
-    planes = (surfels.planarity[upright][rows] > _PLANAR) & (own.planarity[columns] > _PLANAR)
+    planes = _is_plane(surfels)[upright][rows] & _is_plane(own)[columns]
     across = np.abs(np.einsum("ni,ni->n", residuals, own.normals[columns]))[planes]
     normals = surfels.normals[upright] @ R.T
     return _View(alike, near | through, through, moved, normals, across)
+
+
+def _is_plane(surfels: Surfels) -> NDArray[np.bool_]:
+    """Whether surfels are thin and extended in two directions."""
+    across = np.einsum("ni,nij,nj->n", surfels.normals, surfels.covariances, surfels.normals)
+    planes: NDArray[np.bool_] = (surfels.planarity > _PLANAR) & (across < _THIN**2)
+    return planes
 
 
 def _conditioning(view: _View) -> float:

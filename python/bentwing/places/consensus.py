@@ -27,6 +27,7 @@ _BASELINE = 2.0  # m, a shorter one tells no heading
 _SAME_HEADING = np.radians(30.0)
 _DISTINCT = 1.5  # m
 _DISTINCT_HEADING = np.radians(10.0)
+_FEWEST = 3  # keypoints in agreement: two always agree
 _SEED = 1981
 
 
@@ -69,16 +70,10 @@ def hypotheses(a: Place, b: Place, metric: Metric, n: int) -> list[Hypothesis]:
         return []
     yaws, shifts = _transforms(matches, first, second)
     counts = _count(matches, yaws, shifts)
-    found: list[Hypothesis] = []
-    taken: list[int] = []
-    for best in np.argsort(-counts, kind="stable"):
-        if len(found) == n or counts[best] < 3:
-            break
-        if any(_is_same(matches, yaws, shifts, int(best), other) for other in taken):
-            continue
-        taken.append(int(best))
-        found.append(_refined(matches, yaws[best], shifts[best]))
-    return found
+    return [
+        _refined(matches, yaws[best], shifts[best])
+        for best in _distinct_best(matches, yaws, shifts, counts, n)
+    ]
 
 
 def _matches(a: Place, b: Place, metric: Metric) -> _Matches:
@@ -179,21 +174,28 @@ def _refined(matches: _Matches, yaw: float, shift: NDArray[np.float64]) -> Hypot
     return Hypothesis(T, len(set(matches.rows[near].tolist())))
 
 
-def _is_same(
+def _distinct_best(
     matches: _Matches,
     yaws: NDArray[np.float64],
     shifts: NDArray[np.float64],
-    one: int,
-    other: int,
-) -> bool:
-    """Whether two transforms differ by little in the middle of b."""
-    middle = np.median(matches.points_b, axis=0)[None]
-    both = np.array([one, other])
-    moved = _turned(yaws[both], np.repeat(middle, 2, axis=0)) + shifts[both]
-    return bool(
-        np.linalg.norm(moved[0] - moved[1]) < _DISTINCT
-        and abs(_wrap(yaws[one] - yaws[other])) < _DISTINCT_HEADING
-    )
+    counts: NDArray[np.int64],
+    n: int,
+) -> list[int]:
+    """Up to `n` transforms, most agreement first, that differ by more than a little in the middle of b."""
+    middle = np.median(matches.points_b, axis=0)
+    placed = _turned(yaws, np.tile(middle, (len(yaws), 1))) + shifts
+    left = counts >= _FEWEST
+    order = np.argsort(-counts, kind="stable")
+    taken: list[int] = []
+    for best in order.tolist():
+        if len(taken) == n:
+            break
+        if left[best]:
+            taken.append(best)
+            left &= (np.linalg.norm(placed - placed[best], axis=1) > _DISTINCT) | (
+                np.abs(_wrap(yaws - yaws[best])) > _DISTINCT_HEADING
+            )
+    return taken
 
 
 def _turned(yaws: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -69,5 +69,6 @@ def _neighbourhoods(
     order = np.lexsort((found["j"], found["i"]))  # sums do not depend on the trees' order
     owners, indices = found["i"][order], found["j"][order]
     offsets = cloud[indices] - centres[owners]
-    near = np.abs(offsets[:, 2]) <= RADIUS
+    # the keypoint itself is above no sector
+    near = (np.abs(offsets[:, 2]) <= RADIUS) & (offsets[:, :2] != 0.0).any(axis=1)
     return owners[near], offsets[near]

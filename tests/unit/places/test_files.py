@@ -1,15 +1,11 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
 """Places of files: the office that is scanned twice, and what is no run."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from bentwing.errors import UsageError
 from bentwing.places import match_places, places_of_cloud, places_of_run
-
-SCANS = Path(__file__).parents[4] / "shared" / "data" / "room_scans"
 
 
 def test_a_folder_without_a_run_is_refused(tmp_path):
@@ -17,13 +13,12 @@ def test_a_folder_without_a_run_is_refused(tmp_path):
         places_of_run(tmp_path)
 
 
-@pytest.mark.skipif(not SCANS.exists(), reason="the scans of the office are not here")
-def test_two_scans_of_an_office_are_registered_without_a_guess():
-    first, second = (places_of_cloud(SCANS / f"room_scan{n}.pcd") for n in (1, 2))
+def test_two_scans_of_an_office_are_registered_without_a_guess(shared_data):
+    scans = shared_data / "room_scans"
+    first, second = (places_of_cloud(scans / f"room_scan{n}.pcd") for n in (1, 2))
     (found,) = match_places(first, second)
     assert found.accepted, found.reason
     T = found.alignment.T_a_b
-    # as registered by fine alignment of the full clouds from many starts
     assert np.degrees(np.arctan2(T[1, 0], T[0, 0])) == pytest.approx(40.8, abs=0.5)
     np.testing.assert_allclose(T[:3, 3], [1.97, 0.06, 0.03], atol=0.05)
     assert found.agreement.distance < 0.015

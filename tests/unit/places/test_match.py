@@ -5,7 +5,7 @@ import pytest
 from bentwing.places import MatchSettings, describe_run, match_places
 from bentwing.places.transform import apply, inverse
 
-from .conftest import T_B_WORLD, seen
+from .conftest import T_B_WORLD, moved, seen
 
 
 def test_two_views_of_a_hall_find_each_other_whatever_their_headings(places_a, places_b):
@@ -30,6 +30,9 @@ def test_points_without_times_are_matched_too(places_b):
     assert scan[0].span is None
     assert scan[0].free is None
     (found,) = match_places(scan, places_b)
+    assert found.accepted, found.reason
+    other = describe_run(moved(*seen(3, 1), T_B_WORLD)[0])
+    (found,) = match_places(scan, other)
     assert found.accepted, found.reason
     assert np.isnan(found.agreement.conflict)
 

@@ -13,7 +13,7 @@ import argparse
 from pathlib import Path
 
 import numpy as np
-from place_clouds import FLIGHTS, simulated_run
+from place_clouds import FLIGHTS, kept_run
 from scipy.spatial import cKDTree
 
 from bentwing.places import cut_places, learn_metric
@@ -33,11 +33,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("-o", "--output", type=Path, default=OUT)
     parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3, 4])
+    parser.add_argument("--keep", type=Path, help="keep the flights here, and use those kept")
     chosen = parser.parse_args()
     matching, singles = [], []
     for flight in FLIGHTS:
         for seed in chosen.seeds:
-            runs = [simulated_run(flight.scenario(seed, number)) for number in range(2)]
+            runs = [kept_run(flight.scenario(seed, n), chosen.keep) for n in range(2)]
             differences, descriptors = pairs(*runs)
             matching.append(differences)
             singles.append(descriptors)
@@ -60,8 +61,9 @@ def pairs(a, b) -> tuple[np.ndarray, np.ndarray]:
         ours = describe(cloud, keypoints)
         descriptors.append(ours)
         moved = keypoints.points @ T_b_a[:3, :3].T + T_b_a[:3, 3]
-        for cloud_b in clouds_b:
-            differences.append(same_keypoints(cloud_b, moved, keypoints.headings + yaw, ours))
+        differences += [
+            same_keypoints(cloud_b, moved, keypoints.headings + yaw, ours) for cloud_b in clouds_b
+        ]
     return np.concatenate(differences), np.concatenate(descriptors)
 
 

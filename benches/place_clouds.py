@@ -8,13 +8,16 @@ millimetres, as an estimator's do.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bentwing.simulate.ranging import nodes_around
 from bentwing.simulate.scenario import Scenario, prepare
 from bentwing.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 DRIFT = 0.002
 """m per square root of a second, each axis: a random walk."""

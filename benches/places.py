@@ -38,9 +38,7 @@ def main() -> None:
             continue
         runs = {}
         for seed in chosen.seeds:
-            both = [
-                kept_run(flight.scenario(seed, number), chosen.keep) for number in range(2)
-            ]
+            both = [kept_run(flight.scenario(seed, number), chosen.keep) for number in range(2)]
             runs[seed] = [
                 (describe_run(run.points, run.times, run.trajectory), run.T_world_map)
                 for run in both

@@ -40,9 +40,7 @@ class Surfels:
 def voxel_keys(points: NDArray[np.float64], size: float) -> NDArray[np.int64]:
     """Whole numbers (N,) that are equal for points of the same voxel; up to ±1,000,000 voxels."""
     cells = np.floor(points / size).astype(np.int64) + _HALF
-    keys: NDArray[np.int64] = (
-        (cells[:, 0] << (2 * _BITS)) | (cells[:, 1] << _BITS) | cells[:, 2]
-    )
+    keys: NDArray[np.int64] = (cells[:, 0] << (2 * _BITS)) | (cells[:, 1] << _BITS) | cells[:, 2]
     return keys
 
 
@@ -67,10 +65,8 @@ def surfels_of(points: NDArray[np.float64], size: float) -> Surfels:
     return moments_to_surfels(means[enough], covariances)
 
 
-def moments_to_surfels(
-    means: NDArray[np.float64], covariances: NDArray[np.float64]
-) -> Surfels:
-    """Normals and planarity from the covariances' eigenvalues."""
+def moments_to_surfels(means: NDArray[np.float64], covariances: NDArray[np.float64]) -> Surfels:
+    """Find normals and planarity from the covariances' eigenvalues."""
     values, vectors = np.linalg.eigh(covariances)
     total = np.maximum(values.sum(axis=1), 1e-12)
     planarity = 2.0 * (values[:, 1] - np.maximum(values[:, 0], 0.0)) / total

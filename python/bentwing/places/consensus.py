@@ -77,11 +77,9 @@ def hypotheses(a: Place, b: Place, metric: Metric, n: int) -> list[Hypothesis]:
 
 
 def _matches(a: Place, b: Place, metric: Metric) -> _Matches:
-    """The keypoints of b most like each of a's, for both signs of the frames."""
+    """Find the keypoints of b most like each of a's, for both signs of the frames."""
     theirs = metric.apply(b.descriptors)
-    ours = np.concatenate(
-        [metric.apply(a.descriptors), metric.apply(opposite(a.descriptors))]
-    )
+    ours = np.concatenate([metric.apply(a.descriptors), metric.apply(opposite(a.descriptors))])
     n = len(a.keypoints)
     if not n or not len(theirs):
         nothing = np.zeros((0, 3))
@@ -111,9 +109,7 @@ def _samples(matches: _Matches) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     )
     i, j = i[possible], j[possible]
     yaw = _yaw_between(between_a[possible], between_b[possible])
-    fits = np.maximum(
-        np.abs(_wrap(yaw - matches.turns[i])), np.abs(_wrap(yaw - matches.turns[j]))
-    )
+    fits = np.maximum(np.abs(_wrap(yaw - matches.turns[i])), np.abs(_wrap(yaw - matches.turns[j])))
     i, j = i[fits < _SAME_HEADING], j[fits < _SAME_HEADING]
     if len(i) > _MOST_SAMPLES:
         chosen = np.random.default_rng(_SEED).choice(len(i), _MOST_SAMPLES, replace=False)

@@ -102,7 +102,7 @@ def describe_parts(parts: Iterable[Part], settings: PlaceSettings | None = None)
 def _cuts(
     times: NDArray[np.float64], trajectory: Trajectory | None, settings: PlaceSettings
 ) -> list[float]:
-    """Times at which another place begins, without that of the first."""
+    """Find the times at which another place begins, without that of the first."""
     if not len(times):
         return []
     pauses = np.flatnonzero(np.diff(times) > _PAUSE)

@@ -52,7 +52,7 @@ def describe(cloud: NDArray[np.float64], keypoints: Keypoints) -> NDArray[np.flo
 
 
 def opposite(descriptors: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The same descriptors, had the frames' x axes pointed the other way."""
+    """Return the descriptors, had the frames' x axes pointed the other way."""
     n = len(descriptors)
     binned = descriptors[:, : 3 * _N_BINS].reshape(n, 3 * N_RINGS, N_SECTORS)
     turned = np.roll(binned, N_SECTORS // 2, axis=2).reshape(n, 3 * _N_BINS)

@@ -87,9 +87,7 @@ def match_places(
     for i, j in np.ndindex(votes.shape):
         if i_votes := float(votes[i, j]):
             found.append(
-                _tried(
-                    (i, j, i_votes), (a[i], b[j]), (trees_a[i], trees_b[j]), metric, settings
-                )
+                _tried((i, j, i_votes), (a[i], b[j]), (trees_a[i], trees_b[j]), metric, settings)
                 if likely[i, j]
                 else Candidate(i, j, i_votes, _too_few(i_votes, settings))
             )
@@ -150,7 +148,7 @@ def _judged(
 
 
 def _leaning(T_a_b: NDArray[np.float64], most: float = np.radians(3.0)) -> str | None:
-    """Maps are gravity-aligned: a transform that tilts one against the other is wrong."""
+    """Object to a transform that tilts one gravity-aligned map against the other."""
     tilt = float(np.arccos(np.clip(T_a_b[2, 2], -1.0, 1.0)))
     if tilt <= most:
         return None
@@ -158,7 +156,7 @@ def _leaning(T_a_b: NDArray[np.float64], most: float = np.radians(3.0)) -> str |
 
 
 def _merit(candidate: Candidate) -> tuple[bool, float]:
-    """The order of transforms of the same pair: those that are believed, then those that agree most."""
+    """Return the order of transforms of the same pair: those that are believed, then those that agree most."""
     agreement = candidate.agreement
     score = 0.0 if agreement is None else agreement.agreement * agreement.overlap
     return candidate.accepted, score

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from bentwing.places.transform import apply, turned_and_shifted
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+    from scipy.spatial import cKDTree
 
     from bentwing.places.cloud import Surfels
 
@@ -95,7 +95,9 @@ def refine(
             return None
         rows, columns = np.flatnonzero(near), nearest[near]
         residuals = moved[rows] - a.means[columns]
-        spread = a.covariances[columns] + R @ covariances[rows] @ R.T + schedule.sigma**2 * np.eye(3)
+        spread = (
+            a.covariances[columns] + R @ covariances[rows] @ R.T + schedule.sigma**2 * np.eye(3)
+        )
         weights = np.linalg.inv(spread)
         chi2 = np.einsum("ni,nij,nj->n", residuals, weights, residuals)
         # Cauchy; a kernel wide at first, when hardly any surfel is where it should be
@@ -118,7 +120,7 @@ def refine(
 
 
 def _jacobians(arms: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Derivatives (N, 3, 6) of moved points by a turn about the origin of `arms` and a shift."""
+    """Return derivatives (N, 3, 6) of moved points by a turn about the origin of `arms` and a shift."""
     J = np.zeros((len(arms), 3, 6))
     x, y, z = arms.T
     J[:, 0, 1], J[:, 0, 2] = z, -y

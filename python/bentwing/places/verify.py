@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from bentwing.places.refine import SIGMA
 from bentwing.places.transform import apply, inverse
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+    from scipy.spatial import cKDTree
 
     from bentwing.places.cloud import Surfels
     from bentwing.places.place import Place
@@ -79,7 +79,6 @@ class Agreement:
             )
         return None
 
-
     def _needed(self, settings: MatchSettings) -> float:
         """Agreement that is needed: more where there are no planes to compare sharply."""
         return settings.min_agreement + (0.05 if np.isnan(self.distance) else 0.0)
@@ -124,9 +123,7 @@ def verify(
     )
 
 
-def quick_score(
-    place: Place, tree: cKDTree, surfels: Surfels, T: NDArray[np.float64]
-) -> float:
+def quick_score(place: Place, tree: cKDTree, surfels: Surfels, T: NDArray[np.float64]) -> float:
     """How well a transform that is not yet refined puts some surfels of another place into `place`.
 
     The share that comes near a surfel with a similar normal, less the share that ends where the
@@ -152,9 +149,7 @@ def _median(values: NDArray[np.float64]) -> float:
     return float(np.median(values)) if len(values) >= _MIN_PLANES else float("nan")
 
 
-def _view(
-    place: Place, tree: cKDTree, surfels: Surfels, T: NDArray[np.float64]
-) -> _View:
+def _view(place: Place, tree: cKDTree, surfels: Surfels, T: NDArray[np.float64]) -> _View:
     """See the surfels of another place, moved by `T`, from `place`."""
     upright = np.abs(surfels.normals @ T[2, :3]) < _FLAT
     moved, R = apply(T, surfels.means[upright]), T[:3, :3]

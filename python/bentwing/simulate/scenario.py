@@ -106,7 +106,9 @@ class Scenario(BaseModel):
     def rng(self, purpose: str) -> np.random.Generator:
         """Random numbers that depend on the seed and on what they are for."""
         of_world = purpose == "scene" or self.flight_seed is None
-        return np.random.default_rng([self.seed if of_world else self.flight_seed, *purpose.encode()])
+        return np.random.default_rng(
+            [self.seed if of_world else self.flight_seed, *purpose.encode()]
+        )
 
 
 @dataclass(frozen=True, slots=True)

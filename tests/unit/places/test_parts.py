@@ -105,9 +105,7 @@ def test_too_few_pairs_teach_nothing():
 
 
 @settings(deadline=None, max_examples=10)
-@given(
-    st.floats(-0.04, 0.04), st.floats(-0.2, 0.2), st.floats(-0.2, 0.2), st.floats(-0.1, 0.1)
-)
+@given(st.floats(-0.04, 0.04), st.floats(-0.2, 0.2), st.floats(-0.2, 0.2), st.floats(-0.1, 0.1))
 def test_alignment_brings_a_moved_place_back(places_a, yaw, x, y, z):
     from scipy.spatial import cKDTree
 
@@ -128,12 +126,12 @@ def test_a_links_information_is_that_of_the_alignment_in_the_nodes_frame():
     step = 1e-6 * rng.normal(size=6)
     # the same small change, made to the alignment and to the link
     changed = link_between(
-        T_a, T_b, Alignment(turned_and_shifted(T, step, alignment.about), A @ A.T, alignment.about, 1)
+        T_a,
+        T_b,
+        Alignment(turned_and_shifted(T, step, alignment.about), A @ A.T, alignment.about, 1),
     )
     R = geometry.to_matrices(link.quat_xyzw)
-    turn = geometry.log(
-        geometry.multiply(geometry.inverse(link.quat_xyzw), changed.quat_xyzw)
-    )
+    turn = geometry.log(geometry.multiply(geometry.inverse(link.quat_xyzw), changed.quat_xyzw))
     xi = np.concatenate([turn, R.T @ (changed.position - link.position)])
     expected = step @ (A @ A.T) @ step
     assert xi @ link.information @ xi == pytest.approx(0.05 * expected, rel=1e-3)

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
 _BITS = 21
 _HALF = 1 << (_BITS - 1)
+_SIDED = 0.4  # planarity from which a surfel has two sides
 _MIN_POINTS = 6  # of a surfel: as many as its moments have numbers
 
 
@@ -24,7 +25,8 @@ class Surfels:
     ----------
     means : (S, 3) m, map frame
     covariances : (S, 3, 3) m²
-    normals : (S, 3) unit, direction of least extent, of either sign
+    normals : (S, 3) unit, direction of least extent; towards the sensor if `signed`, else of
+        either sign
     planarity : (S,) 2 (λ2 − λ1) / (λ1 + λ2 + λ3): 1 for a disc, 0 for a line or a ball
     """
 
@@ -32,9 +34,19 @@ class Surfels:
     covariances: NDArray[np.float64]
     normals: NDArray[np.float64]
     planarity: NDArray[np.float64]
+    signed: bool = False
 
     def __len__(self) -> int:
         return len(self.means)
+
+    def __getitem__(self, rows: NDArray[np.intp] | NDArray[np.bool_] | slice) -> Surfels:
+        return Surfels(
+            self.means[rows],
+            self.covariances[rows],
+            self.normals[rows],
+            self.planarity[rows],
+            self.signed,
+        )
 
 
 def voxel_keys(points: NDArray[np.float64], size: float) -> NDArray[np.int64]:
@@ -50,8 +62,24 @@ def voxel_means(points: NDArray[np.float64], size: float) -> NDArray[np.float64]
     return np.add.reduceat(points[order], starts, axis=0) / counts[:, None]
 
 
-def surfels_of(points: NDArray[np.float64], size: float) -> Surfels:
-    """Moments of the points in each voxel of edge `size` that holds enough of them."""
+def opposed(a: Surfels, b: Surfels, R: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Whether surfels (S,) of b, turned by R, are the other side of a thin wall than those of a."""
+    if not (a.signed and b.signed):
+        return np.zeros(len(a), dtype=np.bool_)
+    cosines = np.einsum("ni,ij,nj->n", a.normals, R, b.normals)
+    planes = np.minimum(a.planarity, b.planarity) > _SIDED
+    other: NDArray[np.bool_] = planes & (cosines < -0.5)
+    return other
+
+
+def surfels_of(
+    points: NDArray[np.float64], size: float, origins: NDArray[np.float64] | None = None
+) -> Surfels:
+    """Moments of the points in each voxel of edge `size` that holds enough of them.
+
+    Normals are turned towards `origins` (N, 3), where these are known: else two places that saw a
+    wall from its two sides would be pulled together by its thickness.
+    """
     order, starts, counts = _groups(points, size)
     means = np.add.reduceat(points[order], starts, axis=0) / counts[:, None]
     centred = points[order] - np.repeat(means, counts, axis=0)
@@ -62,7 +90,13 @@ def surfels_of(points: NDArray[np.float64], size: float) -> Surfels:
     covariances = np.empty((int(enough.sum()), 3, 3))
     for (i, j), values in zip(zip(rows, columns, strict=True), sums[:, enough], strict=True):
         covariances[:, i, j] = covariances[:, j, i] = values
-    return moments_to_surfels(means[enough], covariances)
+    surfels = moments_to_surfels(means[enough], covariances)
+    if origins is None:
+        return surfels
+    seen_from = (np.add.reduceat(origins[order], starts, axis=0) / counts[:, None])[enough]
+    away = np.einsum("ni,ni->n", surfels.normals, seen_from - surfels.means) < 0
+    normals = np.where(away[:, None], -surfels.normals, surfels.normals)
+    return replace(surfels, normals=normals, signed=True)
 
 
 def moments_to_surfels(means: NDArray[np.float64], covariances: NDArray[np.float64]) -> Surfels:

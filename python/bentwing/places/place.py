@@ -62,7 +62,7 @@ def make_place(
     points = points[::step]
     cloud = voxel_means(points, settings.voxel)
     keypoints = draw_keypoints(cloud, settings.n_keypoints)
-    surfels = surfels_of(points, settings.surfel)
+    surfels = surfels_of(points, settings.surfel, origins)
     centre = np.median(surfels.means, axis=0) if len(surfels) else points.mean(axis=0)
     free = None if origins is None else seen_through(points, origins)
     return Place(span, centre, keypoints, describe(cloud, keypoints), surfels, free)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bentwing.places.cloud import opposed
 from bentwing.places.transform import apply, turned_and_shifted
 
 if TYPE_CHECKING:
@@ -85,12 +86,14 @@ def refine(
     Segal et al. 2009, Generalized-ICP.
     """
     step = -(-len(b) // schedule.most) or 1
-    means, covariances = b.means[::step], b.covariances[::step]
+    b = b[::step]
+    means, covariances = b.means, b.covariances
     for iteration, gate in enumerate(schedule.gates):
         R = T_a_b[:3, :3]
         moved = apply(T_a_b, means)
         distances, nearest = tree.query(moved, distance_upper_bound=gate)
         near = np.isfinite(distances)
+        near[near] = ~opposed(a[nearest[near]], b[near], R)
         if near.sum() < _ENOUGH_PAIRS:
             return None
         rows, columns = np.flatnonzero(near), nearest[near]

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bentwing.places.cloud import opposed
 from bentwing.places.refine import SIGMA
 from bentwing.places.transform import apply, inverse
 
@@ -136,7 +137,8 @@ def quick_score(place: Place, tree: cKDTree, surfels: Surfels, T: NDArray[np.flo
     moved, normals = apply(T, surfels.means[some]), surfels.normals[some] @ T[:3, :3].T
     distances, nearest = tree.query(moved, distance_upper_bound=_NEAR)
     near = np.isfinite(distances)
-    cosines = np.abs(np.einsum("ni,ni->n", normals[near], place.surfels.normals[nearest[near]]))
+    cosines = np.einsum("ni,ni->n", normals[near], place.surfels.normals[nearest[near]])
+    cosines = cosines if place.surfels.signed and surfels.signed else np.abs(cosines)
     # what a plane is off across itself counts, where in its voxel its mean lies does not
     offsets = moved[near] - place.surfels.means[nearest[near]]
     across = np.abs(np.einsum("ni,ni->n", offsets, place.surfels.normals[nearest[near]]))
@@ -155,6 +157,8 @@ def _view(place: Place, tree: cKDTree, surfels: Surfels, T: NDArray[np.float64])
     moved, R = apply(T, surfels.means[upright]), T[:3, :3]
     distances, nearest = tree.query(moved, k=1, distance_upper_bound=_NEAR)
     near = np.isfinite(distances)
+    # the other side of a thin wall says nothing about the side that this place saw
+    near[near] = ~opposed(place.surfels[nearest[near]], surfels[upright][near], R)
     rows, columns = np.flatnonzero(near), nearest[near]
     own = place.surfels
     spread = (

@@ -35,6 +35,10 @@ def simulate_command(  # noqa: PLR0917 - one parameter per option
     ] = None,
     duration: Annotated[float, Option(help="Length of the recording, s.")] = 60.0,
     seed: Annotated[int, Option(help="Varies geometry, motion, calibration and noise.")] = 0,
+    flight_seed: Annotated[
+        int | None,
+        Option(help="Varies all but the geometry: another flight in the world of --seed."),
+    ] = None,
     bag_format: Annotated[
         str, Option("--format", help="bag (ROS 1), or mcap or db3 (ROS 2).")
     ] = "bag",
@@ -63,6 +67,7 @@ def simulate_command(  # noqa: PLR0917 - one parameter per option
         "head": head,
         "duration": duration,
         "seed": seed,
+        "flight_seed": flight_seed,
         "format": bag_format,
         "motor_rate": motor_rate,
         "spin": spin,

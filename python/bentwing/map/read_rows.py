@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import numpy as np
 
 from bentwing.errors import InputError
+from bentwing.map.lzf import decompress_lzf
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -74,7 +75,7 @@ def pcd_rows(path: Path) -> Iterator[Table]:
             names = [name for name, _, repeat in columns for _ in range(int(repeat))]
             yield from _ascii_rows(path, file, names, count)
             return
-        if header["DATA"][0] != "binary":
+        if header["DATA"][0] not in {"binary", "binary_compressed"}:
             msg = (
                 f"{path}: PCD data of kind {header['DATA'][0]!r} are not read; convert it to binary"
             )
@@ -83,7 +84,31 @@ def pcd_rows(path: Path) -> Iterator[Table]:
             (f"{name}{i}" if name == "_" else name, f"<{kind.lower()}{size}", (int(repeat),))
             for i, (name, (kind, size), repeat) in enumerate(columns)
         ]
-        yield from _binary_rows(path, file, np.dtype(fields), count)
+        if header["DATA"][0] == "binary":
+            yield from _binary_rows(path, file, np.dtype(fields), count)
+        else:
+            yield _compressed_columns(path, file, np.dtype(fields), count)
+
+
+def _compressed_columns(path: Path, file: BinaryIO, dtype: np.dtype[Any], count: int) -> Table:
+    """Decompress all points at once, as they were compressed: column after column."""
+    sizes = file.read(8)
+    if len(sizes) < 8:
+        _refuse_truncated(path, count, 0)
+    compressed, size = (int(n) for n in np.frombuffer(sizes, "<u4"))
+    if size != count * dtype.itemsize:
+        msg = f"{path}: announces {count} points of {dtype.itemsize} bytes, holds {size} bytes"
+        raise InputError(msg)
+    data = decompress_lzf(file.read(compressed), size)
+    columns: dict[str, NDArray[np.float64]] = {}
+    at = 0
+    for name in dtype.names or ():
+        width = count * dtype[name].itemsize
+        if name in {"x", "y", "z", _TIME}:
+            column = np.frombuffer(data[at : at + width], dtype[name].base)
+            columns[name] = column.astype(np.float64)
+        at += width
+    return np.stack([columns[name] for name in "xyz"], axis=1), columns.get(_TIME)
 
 
 def header_lines(path: Path, file: BinaryIO, last: str) -> list[list[str]]:

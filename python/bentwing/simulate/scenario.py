@@ -41,6 +41,8 @@ class Scenario(BaseModel):
     head : sensor head and how it is moved; by default `hokuyo-spin`, for a town `vlp16-motor`
     duration : s
     seed : varies geometry, motion, calibration and noise
+    flight_seed : varies all of that but the geometry: another flight in the world of `seed`; by
+        default `seed`
     format : of the recording: a ROS 1 bag, or a ROS 2 folder with mcap or sqlite storage
     motor_rate : rad/s, of a motor-turned head
     spin : of `hokuyo-spin`: a `steady` rate that wanders a little, or driven by the simulated `plant`
@@ -58,6 +60,7 @@ class Scenario(BaseModel):
     head: HeadName = "hokuyo-spin"
     duration: float = Field(default=60.0, gt=0.0, le=3600.0)
     seed: int = Field(default=0, ge=0)
+    flight_seed: int | None = Field(default=None, ge=0)
     format: Format = "bag"
     motor_rate: float = Field(default=1.0, gt=0.0, le=10.0)
     spin: SpinName = "steady"
@@ -102,7 +105,10 @@ class Scenario(BaseModel):
 
     def rng(self, purpose: str) -> np.random.Generator:
         """Random numbers that depend on the seed and on what they are for."""
-        return np.random.default_rng([self.seed, *purpose.encode()])
+        of_world = purpose == "scene" or self.flight_seed is None
+        return np.random.default_rng(
+            [self.seed if of_world else self.flight_seed, *purpose.encode()]
+        )
 
 
 @dataclass(frozen=True, slots=True)

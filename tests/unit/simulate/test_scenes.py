@@ -4,6 +4,7 @@ import pytest
 
 from bentwing._core import Scene
 from bentwing.simulate.planner import plan_tour
+from bentwing.simulate.scenario import Scenario, prepare
 from bentwing.simulate.scenes import SCENES, World
 from bentwing.simulate.scenes.mesh import ball, box, column, gable
 from bentwing.simulate.scenes.parts import car, facade, table
@@ -65,3 +66,14 @@ def test_a_window_is_set_back_by_its_reveal():
     origins = np.array([[0.5, -1.0, 0.5], [1.5, -1.0, 1.5]])
     ranges, _ = scene.cast(origins, np.tile([0.0, 1.0, 0.0], (2, 1)), 10.0)
     np.testing.assert_allclose(ranges, [1.0, 1.2])
+
+
+def test_another_flight_seed_flies_elsewhere_in_the_same_world():
+    one, other = (
+        prepare(Scenario(scene="office", seed=3, flight_seed=number, duration=25.0))
+        for number in (None, 7)
+    )
+    np.testing.assert_array_equal(one.world.site.mesh.vertices, other.world.site.mesh.vertices)
+    times = np.array([0.0, 12.0])
+    apart = np.linalg.norm(one.rig.imu(times).p - other.rig.imu(times).p, axis=1)
+    assert apart.min() > 0.5

@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""Points of simulated flights, placed by their true poses: what the benches of places compare.
+
+A run's map frame is turned and shifted at random against the world, and its points drift by a few
+millimetres, as an estimator's do.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bentwing.simulate.ranging import nodes_around
+from bentwing.simulate.scenario import Scenario, prepare
+from bentwing.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+DRIFT = 0.002
+"""m per square root of a second, each axis: a random walk."""
+THINNING = 4
+"""Of so many beams, one is cast."""
+POSE_STEP = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class SimulatedRun:
+    """A run as it leaves an estimator, with the truth about its frame.
+
+    Attributes
+    ----------
+    points, times : (N, 3) m, map frame; (N,) s
+    trajectory : of the lidar in the map
+    T_world_map : (4, 4)
+    """
+
+    points: np.ndarray
+    times: np.ndarray
+    trajectory: Trajectory
+    T_world_map: np.ndarray
+
+
+def simulated_run(scenario: Scenario) -> SimulatedRun:
+    """Fly the scenario, and place its returns by the true poses."""
+    setup = prepare(scenario)
+    ranger, rig = replace(setup.sensors.ranger, movers=()), setup.rig
+    points, times = [], []
+    for start in np.arange(setup.first, setup.last, 1.0):
+        beams = rig.head.lidar.beams(start, min(start + 1.0, setup.last))
+        if beams is None:
+            continue
+        keep = np.s_[::THINNING] if beams.sweep_axis == 0 else np.s_[:, ::THINNING]
+        beams = replace(beams, times=beams.times[keep], directions=beams.directions[keep])
+        ranges, _ = ranger.measure(beams)
+        ok = np.isfinite(ranges) & (ranges > 0.4)
+        nodes = nodes_around(beams, rig.lidar)
+        origins, directions = nodes.place(beams.times[ok], beams.directions[ok])
+        points.append(origins + directions * ranges[ok][:, None])
+        times.append(beams.times[ok])
+    poses = np.arange(setup.first, setup.last + POSE_STEP, POSE_STEP)
+    lidar = rig.lidar(poses)
+    rng = np.random.default_rng([scenario.seed, scenario.flight_seed or 0, 17])
+    T_world_map = _frame(rng, lidar.p[0])
+    walk = np.cumsum(rng.normal(0.0, DRIFT * np.sqrt(POSE_STEP), lidar.p.shape), axis=0)
+    all_times = np.concatenate(times)
+    drift = np.column_stack([np.interp(all_times, poses, walk[:, i]) for i in range(3)])
+    R, t = T_world_map[:3, :3], T_world_map[:3, 3]
+    placed = (np.concatenate(points) + drift - t) @ R
+    identity = np.tile([0.0, 0.0, 0.0, 1.0], (len(poses), 1))
+    track = Trajectory(poses, (lidar.p + walk - t) @ R, identity)
+    return SimulatedRun(placed, all_times, track, T_world_map)
+
+
+def _frame(rng: np.random.Generator, position: np.ndarray) -> np.ndarray:
+    yaw = rng.uniform(-np.pi, np.pi)
+    T = np.eye(4)
+    T[:2, :2] = [[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]]
+    T[:3, 3] = position + rng.uniform(-20.0, 20.0, 3)
+    return T
+
+
+@dataclass(frozen=True, slots=True)
+class FlightKind:
+    """Flights of one scene: enough time to see some of it, and heads that see it."""
+
+    scene: str
+    heads: tuple[str, ...]
+    duration: float
+    flight: str = "tour"
+
+    def scenario(self, seed: int, number: int) -> Scenario:
+        """Flight `number` in the world of `seed`; heads alternate where there are several."""
+        head = self.heads[number % len(self.heads)] if seed % 2 else self.heads[0]
+        return Scenario(
+            scene=self.scene,
+            seed=seed,
+            flight_seed=100 * seed + number,
+            head=head,
+            duration=self.duration,
+            flight=self.flight,
+        )
+
+
+FLIGHTS = (
+    FlightKind("office", ("hokuyo-spin", "vlp16-motor"), 30.0),
+    FlightKind("courtyard", ("hokuyo-spin", "vlp16-fixed"), 30.0),
+    FlightKind("forest", ("hokuyo-spin",), 30.0),
+    FlightKind("cave", ("hokuyo-spin",), 40.0),
+    FlightKind("mine", ("hokuyo-spin",), 50.0),
+    FlightKind("town", ("vlp16-motor",), 58.0),
+    FlightKind("dam", ("vlp16-motor",), 30.0, "survey"),
+)
+
+
+def kept_run(scenario: Scenario, folder: Path | None) -> SimulatedRun:
+    """Return the run as kept in `folder`, or fly it, and keep it there."""
+    if folder is None:
+        return simulated_run(scenario)
+    path = folder / f"{scenario.scene}_{scenario.seed}_{(scenario.flight_seed or 0) % 100}.npz"
+    if not path.exists():
+        folder.mkdir(parents=True, exist_ok=True)
+        run = simulated_run(scenario)
+        track = run.trajectory
+        np.savez(
+            path,
+            points=run.points.astype(np.float32),
+            times=run.times,
+            tt=track.times,
+            tp=track.positions,
+            T=run.T_world_map,
+        )
+    kept = np.load(path)
+    upright = np.tile([0.0, 0.0, 0.0, 1.0], (len(kept["tt"]), 1))
+    track = Trajectory(kept["tt"], kept["tp"], upright)
+    return SimulatedRun(kept["points"].astype(np.float64), kept["times"], track, kept["T"])

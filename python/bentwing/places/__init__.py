@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""Places of runs, recognized in each other without a guess where they lie.
+
+A run is cut into places; each is described at keypoints; similar descriptors vote for pairs of
+places; the pairs with votes are verified by their geometry. Whatever was considered is listed, with
+the reason why it was believed or not.
+"""
+
+from __future__ import annotations
+
+from bentwing.places.cut import Part, cut_places, describe_parts, describe_run
+from bentwing.places.from_run import places_of_cloud, places_of_run
+from bentwing.places.link import PlaceLink, link_between
+from bentwing.places.match import Candidate, match_places
+from bentwing.places.metric import Metric, default_metric, learn_metric
+from bentwing.places.place import Place, make_place
+from bentwing.places.refine import Alignment
+from bentwing.places.settings import MatchSettings, PlaceSettings
+from bentwing.places.verify import Agreement
+
+__all__ = [
+    "Agreement",
+    "Alignment",
+    "Candidate",
+    "MatchSettings",
+    "Metric",
+    "Part",
+    "Place",
+    "PlaceLink",
+    "PlaceSettings",
+    "cut_places",
+    "default_metric",
+    "describe_parts",
+    "describe_run",
+    "learn_metric",
+    "link_between",
+    "make_place",
+    "match_places",
+    "places_of_cloud",
+    "places_of_run",
+]

@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""Cut a run into places: by time and way where these are known, else by tiles."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bentwing.places.place import Place, make_place
+from bentwing.places.settings import PlaceSettings
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from numpy.typing import NDArray
+
+    from bentwing.trajectory import Trajectory
+
+_MIN_POINTS = 500  # a place of fewer says nothing
+_PAUSE = 2.0  # s without points, after which another place begins
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """Points of one place: those of a span of time, or of a tile.
+
+    Attributes
+    ----------
+    points : (N, 3) m, map frame
+    span : s, of the points; None where they have no times
+    origins : (N, 3) m, where each was measured from; None where that is unknown
+    """
+
+    points: NDArray[np.float64]
+    span: tuple[float, float] | None
+    origins: NDArray[np.float64] | None
+
+
+def cut_places(
+    points: NDArray[np.float64],
+    times: NDArray[np.float64] | None = None,
+    trajectory: Trajectory | None = None,
+    settings: PlaceSettings | None = None,
+) -> list[Part]:
+    """Cut points into spatially and temporally contiguous parts.
+
+    Parameters
+    ----------
+    points : (N, 3) m, gravity-aligned map frame
+    times : (N,) s, increasing or not; None for points without times, such as those of a terrestrial scan
+    trajectory : of the sensor or close to it, on the same clock; tells how far a place reaches,
+        and what was seen through
+    settings : default: those for all sensors
+
+    Raises
+    ------
+    ValueError
+        If the arrays do not fit each other or a number is not finite.
+    """
+    settings = settings or PlaceSettings()
+    _check(points, times)
+    if times is None:
+        return list(_tiles(points, settings.tile))
+    order = np.argsort(times, kind="stable")
+    points, times = points[order], times[order]
+    if trajectory is not None:
+        inside = trajectory.covers(times)
+        points, times = points[inside], times[inside]
+    cuts = np.searchsorted(times, _cuts(times, trajectory, settings))
+    return [
+        Part(
+            points[first:last],
+            (float(times[first]), float(times[last - 1])),
+            None if trajectory is None else _positions(trajectory, times[first:last]),
+        )
+        for first, last in zip([0, *cuts], [*cuts, len(times)], strict=True)
+        if last - first >= _MIN_POINTS
+    ]
+
+
+def describe_run(
+    points: NDArray[np.float64],
+    times: NDArray[np.float64] | None = None,
+    trajectory: Trajectory | None = None,
+    settings: PlaceSettings | None = None,
+) -> list[Place]:
+    """Cut points into places and describe each; see `cut_places`."""
+    parts = cut_places(points, times, trajectory, settings)
+    return describe_parts(parts, settings)
+
+
+def describe_parts(parts: Iterable[Part], settings: PlaceSettings | None = None) -> list[Place]:
+    """Describe each part as a place."""
+    return [
+        make_place(part.points, span=part.span, origins=part.origins, settings=settings)
+        for part in parts
+    ]
+
+
+def _cuts(
+    times: NDArray[np.float64], trajectory: Trajectory | None, settings: PlaceSettings
+) -> list[float]:
+    """Find the times at which another place begins, without that of the first."""
+    if not len(times):
+        return []
+    pauses = np.flatnonzero(np.diff(times) > _PAUSE)
+    starts = [float(times[0]), *times[pauses + 1].tolist()]
+    ends = [*times[pauses].tolist(), float(times[-1])]
+    cuts: list[float] = []
+    for start, end in zip(starts, ends, strict=True):
+        way = _way(trajectory, start, end)
+        n = max(1, round((end - start) / settings.duration), int(np.ceil(way / settings.tile)))
+        cuts += [start + (end - start) * k / n for k in range(n)]
+    return cuts[1:]
+
+
+def _positions(trajectory: Trajectory, times: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Positions (N, 3) at increasing times inside; rotations, which cost most, are not needed."""
+    return np.column_stack(
+        [np.interp(times, trajectory.times, trajectory.positions[:, axis]) for axis in range(3)]
+    )
+
+
+def _way(trajectory: Trajectory | None, start: float, end: float) -> float:
+    """Length flown, without the noise of single poses."""
+    if trajectory is None or end <= start:
+        return 0.0
+    at = np.linspace(start, end, max(2, int(end - start) + 1))
+    return float(np.linalg.norm(np.diff(_positions(trajectory, at), axis=0), axis=1).sum())
+
+
+def _tiles(points: NDArray[np.float64], tile: float) -> Iterator[Part]:
+    """One part if the points lie within two tiles, else one per square tile seen from above."""
+    if not len(points):
+        return
+    middle = np.median(points[:, :2], axis=0)
+    if (np.quantile(np.abs(points[:, :2] - middle), 0.95, axis=0) <= tile).all():
+        yield Part(points, None, None)
+        return
+    cells = np.floor((points[:, :2] - middle) / tile + 0.5).astype(np.int64)
+    order = np.lexsort(cells.T)
+    changes = np.flatnonzero((np.diff(cells[order], axis=0) != 0).any(axis=1)) + 1
+    for rows in np.split(order, changes):
+        if len(rows) >= _MIN_POINTS:
+            yield Part(points[rows], None, None)
+
+
+def _check(points: NDArray[np.float64], times: NDArray[np.float64] | None) -> None:
+    if points.ndim != 2 or points.shape[1] != 3:
+        msg = f"points: expected shape (N, 3), got {points.shape}"
+        raise ValueError(msg)
+    if times is not None and times.shape != (len(points),):
+        msg = f"times: expected shape ({len(points)},), got {times.shape}"
+        raise ValueError(msg)
+    wrong = ~np.isfinite(points).all(axis=1)
+    wrong |= False if times is None else ~np.isfinite(times)
+    if wrong.any():
+        msg = f"points and times: row {int(np.argmax(wrong))} is not finite"
+        raise ValueError(msg)

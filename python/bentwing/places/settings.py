@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""How places are made, described, and believed to be the same; one default for all sensors."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class PlaceSettings:
+    """How places are made and described.
+
+    Attributes
+    ----------
+    duration : s, of a place; short enough for the drift within it to be small
+    tile : m, edge of the tiles of clouds without times, and the farthest a carrier goes within a
+        place
+    max_points : of a place; of more, every n-th is taken
+    voxel : m, of the averaged cloud
+    surfel : m, voxel of the surfels by which matches are verified
+    n_keypoints : drawn per place
+    """
+
+    duration: float = 10.0
+    tile: float = 30.0
+    max_points: int = 200_000
+    voxel: float = 0.3
+    surfel: float = 0.5
+    n_keypoints: int = 400
+
+
+@dataclass(frozen=True, slots=True)
+class MatchSettings:
+    """What it takes to believe that two places overlap.
+
+    Attributes
+    ----------
+    n_neighbours : of each descriptor that may vote
+    min_votes : for a pair of places to become a candidate
+    max_candidates : of each place, those with the most votes
+    n_hypotheses : transforms of each candidate that get a quick look, those on which most matches agree
+    n_refined : of these that are refined, those that look best
+    min_inliers : keypoints in agreement
+    min_overlap : share of the smaller place that the other one has too
+    min_agreement : share of what both could see that both saw alike
+    max_conflict : share of what one place saw where the other saw through
+    max_distance : m, median across the planes of surfels near each other; the least of the checks
+        to be fooled by places that are built alike, and the first to be widened for a poor sensor
+    min_conditioning : least eigenvalue of the alignment's information, per surfel
+    """
+
+    n_neighbours: int = 5
+    min_votes: float = 8.0
+    max_candidates: int = 8
+    n_hypotheses: int = 40
+    n_refined: int = 4
+    min_inliers: int = 4
+    min_overlap: float = 0.25
+    min_agreement: float = 0.8
+    max_conflict: float = 0.01
+    max_distance: float = 0.025
+    min_conditioning: float = 0.01

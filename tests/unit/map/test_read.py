@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from bentwing.errors import InputError, UsageError
 from bentwing.map import read_rows
 from bentwing.map.chunk import MapChunk
+from bentwing.map.lzf import decompress_lzf
 from bentwing.map.read import read_parts, read_points
 from bentwing.map.read_mesh import read_mesh
 from bentwing.map.writer import open_map
@@ -124,3 +125,33 @@ def test_a_mesh_with_a_changed_byte_is_read_or_an_input_error(tmp_path, at, byte
     except InputError:
         return
     assert mesh is None or mesh.triangles.max() < len(mesh.vertices)
+
+
+def test_repetitions_of_compressed_data_may_overlap_themselves():
+    # three bytes as they are, then nine from two back: abc + bcbcbcbcb
+    packed = bytes([2]) + b"abc" + bytes([7 << 5, 0, 1])
+    assert decompress_lzf(packed, 12) == b"abcbcbcbcbcb"
+
+
+@pytest.mark.parametrize("packed", [b"\x02abc\x20\x05", b"\x02abc", b"\x02ab"])
+def test_damaged_compressed_data_are_refused(packed):
+    with pytest.raises(ValueError, match="damaged"):
+        decompress_lzf(packed, 12)
+
+
+def test_compressed_pcd_files_are_read_and_truncated_ones_refused(tmp_path):
+    points = np.arange(30, dtype="<f4").reshape(10, 3)
+    columns = np.ascontiguousarray(points.T).tobytes()
+    # each 20 bytes as they are
+    packed = b"".join(bytes([19]) + columns[k : k + 20] for k in range(0, 120, 20))
+    header = (
+        "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 10\nHEIGHT 1\n"
+        "POINTS 10\nDATA binary_compressed\n"
+    )
+    content = header.encode() + np.array([len(packed), 120], "<u4").tobytes() + packed
+    path = tmp_path / "map.pcd"
+    path.write_bytes(content)
+    np.testing.assert_array_equal(read_points(path), points)
+    path.write_bytes(content[:-5])
+    with pytest.raises(InputError):
+        read_points(path)

@@ -238,9 +238,17 @@ def simulated(made_once):
     """Return a maker of simulated recordings: the folder with recording, payload and truth."""
 
     @functools.cache
-    def make(scene, duration, *, seed=0, head="hokuyo-spin", events=()):
-        name = "-".join(["sim", scene, head, f"{duration:g}", str(seed), *events])
-        scenario = Scenario(scene=scene, head=head, duration=duration, seed=seed, events=events)
+    def make(scene, duration, *, seed=0, flight_seed=None, head="hokuyo-spin", events=()):
+        flight = [] if flight_seed is None else [f"flight{flight_seed}"]
+        name = "-".join(["sim", scene, head, f"{duration:g}", str(seed), *flight, *events])
+        scenario = Scenario(
+            scene=scene,
+            head=head,
+            duration=duration,
+            seed=seed,
+            flight_seed=flight_seed,
+            events=events,
+        )
         return made_once(name, lambda folder: simulate(scenario, folder))
 
     return make

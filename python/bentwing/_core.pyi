@@ -294,6 +294,21 @@ class Samples:
 class Surfels:
     """Surfels of a stretch of time, in the lidar frame at their mean stamps."""
 
+    @staticmethod
+    def of_levels(
+        levels: Sequence[
+            tuple[float, NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
+        ],
+        stamp: float,
+    ) -> Surfels:
+        """Surfels that are known already, as those of a map, all at one stamp, s.
+
+        Parameters
+        ----------
+        levels : of each the voxel size, m, the means (N, 3), m, the covariances (N, 9), m², and unit
+            normals (N, 3); finest first
+        """
+
     def __len__(self) -> int: ...
     @property
     def stamps(self) -> NDArray[np.float64]:

@@ -12,6 +12,8 @@ from bentwing import estimators
 from bentwing.checkpoint import Checkpoint
 from bentwing.errors import EstimationError
 from bentwing.global_registration import Budget, GlobalSettings, close_loops
+from bentwing.localize import Difference, NotInMapError, find_in_map, read_prior_map
+from bentwing.map.chunk import untimed
 from bentwing.map.project import project
 from bentwing.map.sample import MapSample
 from bentwing.map.thin import thin
@@ -28,7 +30,11 @@ from bentwing.run_settings import described_settings, load_payload
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from bentwing.estimators.interface import Estimator
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from bentwing.estimators.interface import Estimate, Estimator
+    from bentwing.localize import PriorMap
     from bentwing.progress import Stage
     from bentwing.recording import Payload
 
@@ -42,6 +48,7 @@ def map_recording(
     map_format: str = "laz",
     map_spacing: float = 0.0,
     loop_closure: bool = True,
+    prior_map: Path | str | None = None,
     settings: Any = None,  # noqa: ANN401 - each estimator has its own model
     threads: int | None = None,
     start: float | None = None,
@@ -60,6 +67,8 @@ def map_recording(
     map_format : one of `MAP_FORMATS`
     map_spacing : m, edge of the voxels that keep one point each; 0 keeps all points
     loop_closure : whether places seen again may correct the trajectory
+    prior_map : a run folder or a cloud in which the recording is found, and with which it is registered:
+        trajectory and map are then in its frame, and what has changed is written too
     settings : of the estimator; default: its defaults
     threads : of the estimator; default: all cores
     start, duration : s, the part of the recording to use; default: all of it
@@ -79,7 +88,8 @@ def map_recording(
         "estimator": estimator,
         "map_format": map_format,
         "map_spacing": map_spacing,
-        "loop_closure": plain(GlobalSettings()) if loop_closure else False,
+        "loop_closure": plain(GlobalSettings()) if loop_closure or prior_map else False,
+        "prior_map": None if prior_map is None else str(prior_map),
         "threads": threads,
         "start": start,
         "duration": duration,
@@ -92,17 +102,18 @@ def map_recording(
             with folder.stage("inputs"):
                 described = [Path(payload)] if isinstance(payload, (str, Path)) else []
                 folder.add_inputs([*recording.paths, *described])
+                prior = None if prior_map is None else _prior(Path(prior_map), folder)
             checkpoint = Checkpoint(folder)
             done = checkpoint.restore(run) if resume else None
             if done is None:
                 with folder.stage("estimate"), watch.stage("estimate", part.length) as shown:
                     _estimate(engine, part, shown, folder, run)
                 checkpoint.save("estimate", run)
-            if loop_closure and done != "loops":
-                _close_loops(run, part, watch, folder, threads)
+            if (loop_closure or prior) and done != "loops":
+                _close_loops(run, part, watch, folder, threads=threads, prior=prior)
                 checkpoint.save("loops", run)
             with folder.stage("map"), watch.stage("map", part.length) as shown:
-                _write_map(run, part, shown, folder, asked)
+                _write_map(run, part, shown, folder, asked=asked, prior=prior)
             with folder.stage("report"):
                 folder.save()
                 report_run(folder, run, complete=True)
@@ -133,18 +144,41 @@ def _estimate(
     folder.write_trajectory("trajectory.txt", run.estimate, origin_ns)
 
 
+def _prior(path: Path, folder: RunFolder) -> PriorMap:
+    settings = GlobalSettings()
+    prior = read_prior_map(path, settings.surfels)
+    folder.add_inputs([prior.file])
+    return prior
+
+
 def _close_loops(
-    run: Run, part: RecordingPart, watch: Progress, folder: RunFolder, threads: int | None
+    run: Run,
+    part: RecordingPart,
+    watch: Progress,
+    folder: RunFolder,
+    *,
+    threads: int | None,
+    prior: PriorMap | None,
 ) -> None:
     if run.estimate is None:
         return
     settings = GlobalSettings()
     budget = Budget.of(part.length, settings)
     watch.note(f"loops: {budget.sentence()}")
+    estimate, known = run.estimate, None
+    if prior is not None:
+        estimate = _localize(estimate, part, watch, folder, threads=threads, prior=prior)
+        known = prior.surfels_near(estimate.trajectory)
     with folder.stage("loops"), watch.stage("loops", part.length) as shown:
         batches = part.batches(shown, Counter())  # what is dropped was counted in the first pass
         closed = close_loops(
-            run.estimate, batches, part.payload, settings=settings, budget=budget, threads=threads
+            estimate,
+            batches,
+            part.payload,
+            settings=settings,
+            budget=budget,
+            known=known,
+            threads=threads,
         )
     run.estimate = closed.estimate
     folder.record["loop_closure"] = closed.record
@@ -152,12 +186,37 @@ def _close_loops(
     folder.write_trajectory("trajectory.txt", run.estimate, part.recording.clock.start_ns)
 
 
+def _localize(
+    estimate: Estimate,
+    part: RecordingPart,
+    watch: Progress,
+    folder: RunFolder,
+    *,
+    threads: int | None,
+    prior: PriorMap,
+) -> Estimate:
+    with folder.stage("localize"), watch.stage("localize", part.length) as shown:
+        try:
+            found = find_in_map(estimate, part.batches(shown, Counter()), prior, threads=threads)
+        except NotInMapError as error:
+            folder.record["localization"] = error.record
+            raise
+    folder.record["localization"] = found.record
+    return found.estimate
+
+
 def _write_map(
-    run: Run, part: RecordingPart, shown: Stage, folder: RunFolder, asked: dict[str, Any]
+    run: Run,
+    part: RecordingPart,
+    shown: Stage,
+    folder: RunFolder,
+    *,
+    asked: dict[str, Any],
+    prior: PriorMap | None,
 ) -> None:
     if run.estimate is None:
         return
-    counts = folder.record["counts"]
+    counts, map_format = folder.record["counts"], asked["map_format"]
     chunks = project(
         part.batches(shown, Counter()),  # what is dropped was counted in the first pass
         run.estimate.trajectory,
@@ -166,11 +225,22 @@ def _write_map(
         threads=asked["threads"],
         counts=counts,
     )
+    origin_ns = part.recording.clock.start_ns
+    difference = None
+    if prior is not None:
+        difference = Difference(prior.cloud, run.estimate.trajectory)
+        chunks = difference.watch(chunks)
     chunks = thin(chunks, asked["map_spacing"], counts)
-    path = folder.file(f"map.{asked['map_format']}")
-    with open_map(path, asked["map_format"], part.recording.clock.start_ns) as writer:
+    path = folder.file(f"map.{map_format}")
+    with open_map(path, map_format, origin_ns) as writer:
         for chunk in run.sample.watch(chunks):
             writer.write(chunk)
+    if difference is not None:
+        folder.record["localization"] |= difference.record
+        for name in ("appeared", "disappeared"):
+            points: NDArray[np.float64] = getattr(difference, name)
+            with open_map(folder.file(f"{name}.{map_format}"), map_format, origin_ns) as writer:
+                writer.write(untimed(points))
 
 
 @contextmanager

@@ -65,6 +65,7 @@ class RunFolder:
             "timings": {},
             "warnings": [],
             "calibration": None,
+            "localization": None,
             "loop_closure": None,
             "segments": [],
             "windows": [],

@@ -11,7 +11,7 @@ use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, ToPyArray};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::arrays::{angles as angles_of, finite_rows, times, to_array2};
+use crate::arrays::{angles as angles_of, finite_number, finite_rows, times, to_array2, vectors};
 use crate::errors::{in_pool, solve_error};
 use crate::trajectory::{Globals, Imu, Samples};
 
@@ -80,8 +80,50 @@ impl From<RegistrationSettings> for core::Settings {
 #[pyclass(frozen, module = "bentwing._core")]
 pub(crate) struct Surfels(pub(crate) Arc<SurfelSet>);
 
+/// Voxel size, means (N, 3), covariances (N, 9) and normals (N, 3) of the surfels of a level.
+type Level<'py> = (
+    f64,
+    PyReadonlyArray2<'py, f64>,
+    PyReadonlyArray2<'py, f64>,
+    PyReadonlyArray2<'py, f64>,
+);
+
 #[pymethods]
 impl Surfels {
+    /// Surfels that are known already, as those of a map, all at one stamp.
+    #[staticmethod]
+    fn of_levels(levels: Vec<Level<'_>>, stamp: f64) -> PyResult<Self> {
+        let stamp = finite_number("stamp", stamp)?;
+        let mut set = SurfelSet {
+            level_starts: vec![0],
+            ..SurfelSet::default()
+        };
+        for (voxel_size, means, covariances, normals) in &levels {
+            let means = finite_rows("means", means)?;
+            let covariances: &[[f64; 9]] = finite_rows("covariances", covariances)?;
+            let normals = finite_rows("normals", normals)?;
+            if covariances.len() != means.len() || normals.len() != means.len() {
+                return Err(PyValueError::new_err(format!(
+                    "expected as many covariances and normals as means, got {}, {} and {}",
+                    covariances.len(),
+                    normals.len(),
+                    means.len()
+                )));
+            }
+            set.means.extend(vectors(means));
+            set.normals.extend(vectors(normals));
+            let matrices = covariances.iter().map(|c| Matrix3::from_row_slice(c));
+            set.covariances.extend(matrices);
+            set.voxel_sizes.push(finite_number("voxel size", *voxel_size)?);
+            set.level_starts.push(set.means.len());
+        }
+        set.stamps = vec![stamp; set.means.len()];
+        set.angles = vec![0.0; set.means.len()];
+        // Nothing asks how many points a known surfel had.
+        set.n_points = vec![1; set.means.len()];
+        Ok(Self(Arc::new(set)))
+    }
+
     fn __len__(&self) -> usize {
         self.0.len()
     }

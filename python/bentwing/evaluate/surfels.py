@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing.evaluate.moments import VoxelMoments
+from bentwing.map.moments import VoxelMoments
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

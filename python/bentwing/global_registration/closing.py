@@ -15,6 +15,7 @@ from bentwing.estimators.mount import MotorMount
 from bentwing.estimators.slow_states import SLICES, SlowStatePrior
 from bentwing.global_registration.biases import drift_of, has_inertial_states
 from bentwing.global_registration.budget import HELD, Budget
+from bentwing.global_registration.fixed import fixed_piece
 from bentwing.global_registration.matching import MatchingPlan
 from bentwing.global_registration.outcome import closed_estimate, improved, record_of
 from bentwing.global_registration.settings import GlobalSettings
@@ -54,6 +55,7 @@ def close_loops(
     *,
     settings: GlobalSettings | None = None,
     budget: Budget | None = None,
+    known: _core.Surfels | None = None,
     threads: int | None = None,
 ) -> Closed:
     """Correct an estimate by everything its recording saw more than once (Kaul 2015, section 2.2).
@@ -63,6 +65,8 @@ def close_loops(
     estimate : of any estimator
     batches : of the recording, as the estimator got them
     budget : what may be held; default: that of the settings for the length of the estimate
+    known : surfels of a map that is already right: the estimate, which must lie within reach of the
+        matches, comes to it, and it does not move
     threads : default: all cores
 
     Returns
@@ -85,9 +89,10 @@ def close_loops(
     record: dict[str, Any] = {"applied": False, "budget": budget}
     if not any(p.surfels for p in pieces):
         return _unchanged(estimate, record, "there are no points along the trajectory")
+    fixed = [] if known is None else [fixed_piece(known)]
     try:
         found = _core.register_globally(
-            [_piece(p, inertial, estimate, payload) for p in pieces],
+            [*fixed, *(_piece(p, inertial, estimate, payload) for p in pieces)],
             settings=CoreSettings.of(
                 settings.registration(budget.seconds), payload, interval_of(estimate)
             ),
@@ -101,12 +106,13 @@ def close_loops(
         "register": time.perf_counter() - collected,
     }
     segments = [p.trajectory for p in pieces]
-    record.update(record_of(found, segments, timings))
+    moved = found.samples[len(fixed) :]
+    record.update(record_of(found, segments, moved, timings))
     why = improved(found)
     if why:
         return _unchanged(estimate, record, why)
     record["applied"] = True
-    return Closed(closed_estimate(estimate, found, segments), record)
+    return Closed(closed_estimate(estimate, found, segments, moved), record)
 
 
 def _unchanged(estimate: Estimate, record: dict[str, Any], why: str) -> Closed:

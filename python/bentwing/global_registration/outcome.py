@@ -45,18 +45,22 @@ def improved(found: _core.GlobalRegistration) -> str:
 
 
 def closed_estimate(
-    estimate: Estimate, found: _core.GlobalRegistration, segments: Sequence[Trajectory]
+    estimate: Estimate,
+    found: _core.GlobalRegistration,
+    segments: Sequence[Trajectory],
+    corrected: Sequence[_core.Samples],
 ) -> Estimate:
     """Return the estimate with corrected segments and calibration.
 
     Parameters
     ----------
     segments : of the estimate, as they were registered
+    corrected : the same in the result
     """
     dt = interval_of(estimate)
     moved = [
         Trajectory(s.times, np.asarray(n.positions), np.asarray(n.quats_xyzw))
-        for s, n in zip(segments, found.samples, strict=True)
+        for s, n in zip(segments, corrected, strict=True)
     ]
     slow, covariance = found.globals[-1], found.covariances[-1]
     frozen = np.diag(covariance) == 0.0
@@ -72,7 +76,10 @@ def closed_estimate(
 
 
 def record_of(
-    found: _core.GlobalRegistration, segments: Sequence[Trajectory], timings: dict[str, float]
+    found: _core.GlobalRegistration,
+    segments: Sequence[Trajectory],
+    corrected: Sequence[_core.Samples],
+    timings: dict[str, float],
 ) -> dict[str, Any]:
     """Return what was done, for run.json; lengths in m, angles in rad, times in s."""
     n_unknowns, n_links, n_far_links, n_surfels = found.counts
@@ -84,7 +91,7 @@ def record_of(
         "rotation",
         "translation",
     )
-    pairs = list(zip(segments, found.samples, strict=True))
+    pairs = list(zip(segments, corrected, strict=True))
     shifts = [np.linalg.norm(n.positions - s.positions, axis=1).max() for s, n in pairs]
     turns = [_turns(s.quats_xyzw, n.quats_xyzw).max() for s, n in pairs]
     return {

@@ -90,14 +90,19 @@ class VoxelSet:
     def add(self, keys: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Add keys `(N,)`; True where a key was not there before, at its first occurrence."""
         unique, first = np.unique(keys, return_index=True)
-        new = np.ones(len(unique), dtype=np.bool_)
-        for run in self._runs:
-            at = np.minimum(np.searchsorted(run, unique), len(run) - 1)
-            new &= run[at] != unique
+        new = ~self.contains(unique)
         added = np.zeros(len(keys), dtype=np.bool_)
         added[first[new]] = True
         self._append(unique[new])
         return added
+
+    def contains(self, keys: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Whether each of keys `(N,)` is there."""
+        there = np.zeros(len(keys), dtype=np.bool_)
+        for run in self._runs:
+            at = np.minimum(np.searchsorted(run, keys), len(run) - 1)
+            there |= run[at] == keys
+        return there
 
     def _append(self, run: NDArray[np.int64]) -> None:
         if not len(run):

@@ -9,7 +9,8 @@ the reason why it was believed or not.
 from __future__ import annotations
 
 from bentwing.places.cut import Part, cut_places, describe_parts, describe_run
-from bentwing.places.from_run import places_of_cloud, places_of_run
+from bentwing.places.free_space import FreeSpace, seen_through
+from bentwing.places.from_run import RunMap, map_of_run, places_of_cloud, places_of_run
 from bentwing.places.link import PlaceLink, link_between
 from bentwing.places.match import Candidate, match_places
 from bentwing.places.metric import Metric, default_metric, learn_metric
@@ -22,12 +23,14 @@ __all__ = [
     "Agreement",
     "Alignment",
     "Candidate",
+    "FreeSpace",
     "MatchSettings",
     "Metric",
     "Part",
     "Place",
     "PlaceLink",
     "PlaceSettings",
+    "RunMap",
     "cut_places",
     "default_metric",
     "describe_parts",
@@ -35,7 +38,9 @@ __all__ = [
     "learn_metric",
     "link_between",
     "make_place",
+    "map_of_run",
     "match_places",
     "places_of_cloud",
     "places_of_run",
+    "seen_through",
 ]

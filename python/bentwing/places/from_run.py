@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,19 +17,55 @@ from bentwing.run_folder import read_record
 from bentwing.trajectory import Trajectory, read_tum
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import NDArray
+
     from bentwing.places.place import Place
     from bentwing.places.settings import PlaceSettings
 
 
-def places_of_run(folder: Path, settings: PlaceSettings | None = None) -> list[Place]:
-    """Describe the places of a run folder: its map's points, and its trajectory.
+@dataclass(frozen=True, slots=True)
+class RunMap:
+    """The map of a run folder, and the way it was seen from.
+
+    Attributes
+    ----------
+    path : of the map's file
+    trajectory : on the clock of the run
+    """
+
+    path: Path
+    trajectory: Trajectory
+    _origin: float
+
+    def parts(self) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64] | None]]:
+        """Points (N, 3) m, and their times (N,) on the clock of the trajectory if the map has any.
+
+        Raises
+        ------
+        InputError
+            If the map cannot be read.
+        """
+        for part in read_parts(self.path):
+            yield part.points, None if part.times is None else part.times - self._origin
+
+    def gathered(self) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
+        """Return all points, and all times if the map has any."""
+        parts = list(self.parts())
+        times = [t for _, t in parts if t is not None]
+        return np.concatenate([p for p, _ in parts]), np.concatenate(times) if times else None
+
+
+def map_of_run(folder: Path) -> RunMap:
+    """Find the map of a run folder.
 
     Raises
     ------
     UsageError
         If the folder holds no run, or the run has no map.
     InputError
-        If its trajectory or its map cannot be read, or the map has no times.
+        If its trajectory cannot be read.
     """
     folder = Path(folder)
     begin = float((read_record(folder).get("segments") or [[0.0]])[0][0])
@@ -40,13 +77,22 @@ def places_of_run(folder: Path, settings: PlaceSettings | None = None) -> list[P
     trajectory = Trajectory(absolute.times + begin, absolute.positions, absolute.quats_xyzw)
     is_las = path.suffix in {".laz", ".las"}
     origin = adjusted_gps_origin(first_ns - round(begin * 1e9)) if is_las else 0.0
-    points, times = [], []
-    for part in read_parts(path):
-        if part.times is None:
-            return describe_run(read_points(path), settings=settings)
-        points.append(part.points)
-        times.append(part.times - origin)
-    return describe_run(np.concatenate(points), np.concatenate(times), trajectory, settings)
+    return RunMap(path, trajectory, origin)
+
+
+def places_of_run(folder: Path, settings: PlaceSettings | None = None) -> list[Place]:
+    """Describe the places of a run folder: its map's points, and its trajectory.
+
+    Raises
+    ------
+    UsageError
+        If the folder holds no run, or the run has no map.
+    InputError
+        If its trajectory or its map cannot be read.
+    """
+    run = map_of_run(folder)
+    points, times = run.gathered()
+    return describe_run(points, times, None if times is None else run.trajectory, settings)
 
 
 def places_of_cloud(path: Path, settings: PlaceSettings | None = None) -> list[Place]:

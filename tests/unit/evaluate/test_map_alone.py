@@ -5,10 +5,10 @@ import pytest
 from bentwing.evaluate import spacing as spacing_module
 from bentwing.evaluate.clouds import Cloud
 from bentwing.evaluate.entropy import map_entropy
-from bentwing.evaluate.moments import VoxelMoments
 from bentwing.evaluate.revisits import revisit_consistency
 from bentwing.evaluate.spacing import point_spacing
 from bentwing.map.chunk import MapChunk
+from bentwing.map.moments import VoxelMoments
 from bentwing.map.thin import voxel_cells, voxel_keys
 from bentwing.map.writer import open_map
 

@@ -9,7 +9,9 @@ import pytest
 from bentwing import geometry
 from bentwing.estimators.interface import Calibration, Estimate
 from bentwing.estimators.mount import FixedMount, Pose
+from bentwing.estimators.settings import SurfelSettings
 from bentwing.global_registration import GlobalSettings, close_loops
+from bentwing.localize.map_surfels import SurfelMaker, core_surfels
 from bentwing.recording import LidarBatch, Payload
 from bentwing.trajectory import Trajectory
 
@@ -126,3 +128,28 @@ def test_what_does_not_settle_is_left_as_it_was():
 def test_a_recording_without_points_is_left_as_it_was():
     found = close_loops(estimate(truth()), iter(()), PAYLOAD)
     assert found.record["reason"] == "there are no points along the trajectory"
+
+
+def room_points(n=400_000):
+    rng = np.random.default_rng(5)
+    points = rng.uniform(ROOM[:, 0], ROOM[:, 1], (n, 3))
+    axis, side = rng.integers(0, 3, n), rng.integers(0, 2, n)
+    points[np.arange(n), axis] = ROOM[axis, side]
+    return points
+
+
+def map_of_room(origin):
+    maker, points = SurfelMaker(SurfelSettings()), room_points()
+    maker.add(points, None if origin is None else np.broadcast_to(origin, points.shape))
+    return maker.levels()
+
+
+@pytest.mark.parametrize("origin", [None, [0.3, 0.2, 0.1]], ids=["cloud", "run"])
+def test_a_bent_trajectory_comes_to_the_map_and_the_map_stays(origin):
+    known = core_surfels(map_of_room(origin))
+    drifted = bent(truth())
+    moved = replace(drifted, positions=drifted.positions + np.array([0.2, -0.1, 0.15]))
+    found = close_loops(estimate(moved), scans(), PAYLOAD, known=known, threads=2)
+    assert found.record["applied"], found.record
+    assert off(moved) > 0.2
+    assert off(found.estimate.trajectory) < 0.004

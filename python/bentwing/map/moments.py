@@ -31,11 +31,30 @@ class VoxelMoments:
         """Add points (N, 3) m."""
         if not len(points):
             return
-        keys = voxel_keys(points, self._edge)
-        # relative to the voxel's centre, so that squares keep their precision
-        local = points - (np.floor(points / self._edge) + 0.5) * self._edge
+        local = self._local(points)
         squares = local[:, _ROWS] * local[:, _COLUMNS]
-        run = _summed(keys, np.hstack([np.ones((len(points), 1)), local, squares]))
+        self._append(points, np.hstack([np.ones((len(points), 1)), local, squares]))
+
+    def add_moments(
+        self,
+        counts: NDArray[np.int64],
+        means: NDArray[np.float64],
+        covariances: NDArray[np.float64],
+    ) -> None:
+        """Add what `result` of finer voxels, of which a whole number fills one of these, returned."""
+        if not len(counts):
+            return
+        local, n = self._local(means), counts[:, None].astype(np.float64)
+        squares = covariances[:, _ROWS, _COLUMNS] + local[:, _ROWS] * local[:, _COLUMNS]
+        self._append(means, np.hstack([n, n * local, n * squares]))
+
+    def _local(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Points relative to the centres of their voxels, so that squares keep their precision."""
+        local: NDArray[np.float64] = points - (np.floor(points / self._edge) + 0.5) * self._edge
+        return local
+
+    def _append(self, points: NDArray[np.float64], sums: NDArray[np.float64]) -> None:
+        run = _summed(voxel_keys(points, self._edge), sums)
         while self._runs and len(self._runs[-1][0]) <= 2 * len(run[0]):
             older = self._runs.pop()
             run = _summed(*(np.concatenate(pair) for pair in zip(older, run, strict=True)))

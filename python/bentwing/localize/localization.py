@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""From an estimate in its own frame to the estimate in a map's, by places."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bentwing.errors import EstimationError
+from bentwing.localize.placement import place_in_map
+from bentwing.map.project import project
+from bentwing.places import PlaceSettings, describe_run, match_places
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from bentwing.estimators.interface import Estimate
+    from bentwing.localize.prior_map import PriorMap
+    from bentwing.map.chunk import MapChunk
+    from bentwing.places import Candidate, Place
+    from bentwing.recording import Batch
+
+
+@dataclass(frozen=True, slots=True)
+class Localized:
+    """An estimate where it is in a map, to within reach of the registration.
+
+    Attributes
+    ----------
+    estimate : in the map's frame
+    record : how it came there, for run.json
+    """
+
+    estimate: Estimate
+    record: dict[str, Any]
+
+
+def find_in_map(
+    estimate: Estimate,
+    batches: Iterable[Batch],
+    prior: PriorMap,
+    *,
+    threads: int | None = None,
+) -> Localized:
+    """Find a recording in a map without a guess where it is.
+
+    Parameters
+    ----------
+    estimate : open-loop, in its own frame
+    batches : of the recording it is of
+
+    Raises
+    ------
+    NotInMapError
+        If no place was recognized.
+    """
+    chunks = project(
+        batches,
+        estimate.trajectory,
+        estimate.calibration,
+        segments=estimate.segments,
+        threads=threads,
+    )
+    places = _described(chunks, estimate)
+    candidates = match_places(prior.places, places)
+    record: dict[str, Any] = {
+        "map": str(prior.path),
+        "map_points": prior.n_points,
+        "map_places": len(prior.places),
+        "places": len(places),
+        "candidates": [_candidate(c, places) for c in candidates],
+    }
+    placement = place_in_map(estimate, candidates, places)
+    if placement is None:
+        msg = (
+            f"{prior.path}: none of the {len(places)} places of the recording was recognized among "
+            f"the {len(prior.places)} of the map; run.json says why under localization. Is it the same "
+            "site, seen from near enough, and is the map level?"
+        )
+        raise NotInMapError(msg, record)
+    record["supporters"] = placement.supporters
+    record["T_map_run"] = placement.T_map_run.tolist()
+    record["largest_deformation"] = placement.largest_deformation
+    return Localized(placement.estimate, record)
+
+
+class NotInMapError(EstimationError):
+    """No place of the recording was recognized in the map; `record` tells what was tried."""
+
+    def __init__(self, message: str, record: dict[str, Any]) -> None:
+        super().__init__(message)
+        self.record = record
+
+
+def _described(chunks: Iterable[MapChunk], estimate: Estimate) -> list[Place]:
+    """Describe the places of a stream of points, one place at a time."""
+    settings = PlaceSettings()
+    places: list[Place] = []
+    held: list[MapChunk] = []
+    for chunk in chunks:
+        held.append(chunk)
+        if chunk.times[-1] - held[0].times[0] >= settings.duration:
+            places += _place(held, estimate, settings)
+            held = []
+    return places + _place(held, estimate, settings)
+
+
+def _place(held: Sequence[MapChunk], estimate: Estimate, settings: PlaceSettings) -> list[Place]:
+    if not held:
+        return []
+    points = np.concatenate([chunk.points for chunk in held])
+    times = np.concatenate([chunk.times for chunk in held])
+    return describe_run(points, times, estimate.trajectory, settings)
+
+
+def _candidate(candidate: Candidate, places: Sequence[Place]) -> dict[str, Any]:
+    agreement = candidate.agreement
+    return {
+        "map_place": candidate.i,
+        "span": places[candidate.j].span,
+        "votes": candidate.votes,
+        "accepted": candidate.accepted,
+        "reason": candidate.reason,
+        "n_inliers": candidate.n_inliers,
+        "overlap": None if agreement is None else agreement.overlap,
+        "agreement": None if agreement is None else agreement.agreement,
+    }

@@ -92,6 +92,7 @@ def map_recording(
             with folder.stage("inputs"):
                 described = [Path(payload)] if isinstance(payload, (str, Path)) else []
                 folder.add_inputs([*recording.paths, *described])
+                folder.add_recordings(recording.paths, recording.clock.start_ns)
             checkpoint = Checkpoint(folder)
             done = checkpoint.restore(run) if resume else None
             if done is None:

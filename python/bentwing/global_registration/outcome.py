@@ -45,20 +45,24 @@ def improved(found: _core.GlobalRegistration) -> str:
 
 
 def closed_estimate(
-    estimate: Estimate, found: _core.GlobalRegistration, segments: Sequence[Trajectory]
+    estimate: Estimate,
+    found: _core.GlobalRegistration,
+    segments: Sequence[Trajectory],
+    own: slice = slice(None),
 ) -> Estimate:
     """Return the estimate with corrected segments and calibration.
 
     Parameters
     ----------
-    segments : of the estimate, as they were registered
+    segments : all that were registered, as they were
+    own : which of them are the estimate's
     """
     dt = interval_of(estimate)
     moved = [
         Trajectory(s.times, np.asarray(n.positions), np.asarray(n.quats_xyzw))
-        for s, n in zip(segments, found.samples, strict=True)
+        for s, n in zip(segments[own], found.samples[own], strict=True)
     ]
-    slow, covariance = found.globals[-1], found.covariances[-1]
+    slow, covariance = found.globals[own][-1], found.covariances[own][-1]
     frozen = np.diag(covariance) == 0.0
     calibration = replace(
         estimate.calibration,

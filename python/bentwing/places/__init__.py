@@ -16,6 +16,7 @@ from bentwing.places.metric import Metric, default_metric, learn_metric
 from bentwing.places.place import Place, make_place
 from bentwing.places.refine import Alignment
 from bentwing.places.settings import MatchSettings, PlaceSettings
+from bentwing.places.stream import PartStream
 from bentwing.places.verify import Agreement
 
 __all__ = [
@@ -25,6 +26,7 @@ __all__ = [
     "MatchSettings",
     "Metric",
     "Part",
+    "PartStream",
     "Place",
     "PlaceLink",
     "PlaceSettings",

@@ -11,7 +11,8 @@ import numpy as np
 from bentwing.errors import UsageError
 from bentwing.map.gps_time import adjusted_gps_origin
 from bentwing.map.read import MAP_SUFFIXES, read_parts, read_points
-from bentwing.places.cut import describe_run
+from bentwing.places.cut import describe_parts, describe_run
+from bentwing.places.stream import PartStream
 from bentwing.run_folder import read_record
 from bentwing.trajectory import Trajectory, read_tum
 
@@ -31,7 +32,8 @@ def places_of_run(folder: Path, settings: PlaceSettings | None = None) -> list[P
         If its trajectory or its map cannot be read, or the map has no times.
     """
     folder = Path(folder)
-    begin = float((read_record(folder).get("segments") or [[0.0]])[0][0])
+    segments = [(float(a), float(b)) for a, b in read_record(folder).get("segments") or []]
+    begin = segments[0][0] if segments else 0.0
     path = next((p for s in MAP_SUFFIXES if (p := folder / f"map{s}").exists()), None)
     if path is None:
         msg = f"{folder}: the run has no map; run `bentwing map` again, to its end"
@@ -40,13 +42,14 @@ def places_of_run(folder: Path, settings: PlaceSettings | None = None) -> list[P
     trajectory = Trajectory(absolute.times + begin, absolute.positions, absolute.quats_xyzw)
     is_las = path.suffix in {".laz", ".las"}
     origin = adjusted_gps_origin(first_ns - round(begin * 1e9)) if is_las else 0.0
-    points, times = [], []
+    spans = segments or [(float(trajectory.times[0]), float(trajectory.times[-1]))]
+    stream = PartStream(trajectory, spans, settings)
+    places: list[Place] = []
     for part in read_parts(path):
         if part.times is None:
             return describe_run(read_points(path), settings=settings)
-        points.append(part.points)
-        times.append(part.times - origin)
-    return describe_run(np.concatenate(points), np.concatenate(times), trajectory, settings)
+        places += describe_parts(stream.add(part.points, part.times - origin), settings)
+    return [*places, *describe_parts(stream.finish(), settings)]
 
 
 def places_of_cloud(path: Path, settings: PlaceSettings | None = None) -> list[Place]:

@@ -241,7 +241,7 @@ def _one_map(folder: RunFolder, group: Placed, found: _Found) -> MergedMap:
             )
     run = Run(folder.path)
     with folder.stage("map"):
-        write_trajectories(folder, sources, estimates)
+        write_trajectories(folder, sources, [r.estimate for r in recorded], estimates)
         write_map(folder, sources, run, estimates, found.options, found.watch)
     run.estimate = Estimate(one_after_the_other(estimates), estimates[0].calibration)
     with folder.stage("report"):

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bentwing import geometry
 from bentwing.clock import NS_PER_S
 from bentwing.map.project import project
 from bentwing.map.thin import thin
@@ -41,11 +42,20 @@ class MapOptions:
 
 
 def write_trajectories(
-    folder: RunFolder, sources: Sequence[Source], estimates: Sequence[Estimate]
+    folder: RunFolder,
+    sources: Sequence[Source],
+    placed: Sequence[Estimate],
+    estimates: Sequence[Estimate],
 ) -> None:
-    """Write a trajectory for each run, and say in the record what belongs together."""
+    """Write a trajectory for each run, and say in the record what belongs together.
+
+    Parameters
+    ----------
+    placed : where the places have put the runs
+    estimates : where the registration has
+    """
     described = []
-    for source, estimate in zip(sources, estimates, strict=True):
+    for source, before, estimate in zip(sources, placed, estimates, strict=True):
         name = f"trajectory_{source.name}.txt"
         folder.write_trajectory(name, estimate, source.start_ns)
         described.append(
@@ -55,11 +65,25 @@ def write_trajectories(
                 "recordings": [str(path) for path in source.recordings],
                 "start_ns": source.start_ns,
                 "trajectory": name,
+                "T_map_run": _rigid(source.estimate, estimate),
+                "T_map_run_by_places": _rigid(source.estimate, before),
                 "segments": plain(estimate.segments),
                 "calibration": plain(estimate.calibration),
             }
         )
     folder.record["runs"] = described
+
+
+def _rigid(before: Estimate, after: Estimate) -> list[list[float]]:
+    """Return the transform (4, 4) that leads from one trajectory to the other, as well as one can."""
+    old, new = before.trajectory.within(before.segments), after.trajectory
+    positions, quats = new.interpolate(np.clip(old.times, new.times[0], new.times[-1]))
+    turns = geometry.multiply(quats, geometry.inverse(old.quats_xyzw))
+    R = geometry.to_matrices(geometry.mean_rotation(turns))
+    T = np.eye(4)
+    T[:3, :3] = R
+    T[:3, 3] = positions.mean(axis=0) - R @ old.positions.mean(axis=0)
+    return T.tolist()
 
 
 def write_map(
@@ -141,4 +165,5 @@ def _placed(
 
 def as_settings(options: MapOptions) -> dict[str, Any]:
     """Return the options as run.json has them."""
-    return plain(options)  # type: ignore[no-any-return]
+    described: dict[str, Any] = plain(options)
+    return described

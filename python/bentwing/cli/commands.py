@@ -12,6 +12,7 @@ from typer.core import TyperCommand, TyperGroup
 # name: module, function, and what the list of commands says about it
 COMMANDS = {
     "map": ("map", "map_command", "Turn a recording into a trajectory, a map and a report."),
+    "merge": ("merge", "merge_command", "Put several runs into one map."),
     "info": ("info", "info", "Tell whether a recording is fit for mapping."),
     "plan": ("plan", "plan_command", "Plan a flight: how fast to spin, what will be seen."),
     "evaluate": (

@@ -213,9 +213,9 @@ def _separate_maps(
             own.record["inputs"] = folder.record["inputs"]
             maps.append(_one_map(own, group, found))
     folder.record["warnings"].append(
-        f"no place was found that {'both' if len(groups) == 2 else 'all'} parts of what was given have "
-        f"seen: these are {len(groups)} separate maps, {', '.join(told)}, whose places relative to "
-        "each other are unknown"
+        "not all of the runs have places in common that could be recognised: they are "
+        f"{len(groups)} separate maps, {', '.join(told)}, and where these lie relative to each other "
+        "is unknown"
     )
     with folder.stage("report"):
         folder.save()

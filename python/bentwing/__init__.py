@@ -19,6 +19,7 @@ if TYPE_CHECKING:
         UsageError,
     )
     from bentwing.live import Odometry
+    from bentwing.merging import Merged, merge
     from bentwing.pipeline import map_recording
     from bentwing.recording import Payload, Recording
     from bentwing.registration import WindowResult, register_window
@@ -32,6 +33,7 @@ __all__ = [
     "DivergedError",
     "EstimationError",
     "InputError",
+    "Merged",
     "NotEnoughDataError",
     "Odometry",
     "Payload",
@@ -45,12 +47,15 @@ __all__ = [
     "WindowResult",
     "__version__",
     "map_recording",
+    "merge",
     "register_window",
 ]
 
 # Where the names live; imported when first asked for, so that `import bentwing` costs nothing.
 _HOMES = {
     "Odometry": "live",
+    "Merged": "merging",
+    "merge": "merging",
     "map_recording": "pipeline",
     "Payload": "recording",
     "Recording": "recording",

@@ -109,7 +109,7 @@ class Checkpoint:
         trajectory = Trajectory(*(arrays[name] for name in _TRAJECTORY))
         fields = described["estimate"]
         fields["segments"] = [(first, last) for first, last in fields["segments"]]
-        run.estimate = Estimate(trajectory, _calibration(described["calibration"]), **fields)
+        run.estimate = Estimate(trajectory, read_calibration(described["calibration"]), **fields)
         run.spin_times, run.spin_rates = arrays["spin"].tolist()
         self._folder.record.update(described["record"])
         for name in (*described["files"], NAME):
@@ -139,7 +139,8 @@ class Checkpoint:
             raise UsageError(msg)
 
 
-def _calibration(described: dict[str, Any]) -> Calibration:
+def read_calibration(described: dict[str, Any]) -> Calibration:
+    """Return a calibration as run.json describes it."""
     vectors = {name: np.array(described[name]) for name in ("gyro_bias", "accel_bias", "gravity")}
     mount = _mount(described["mount"])
     return Calibration(described["latency"], mount, **vectors, std=described["std"])

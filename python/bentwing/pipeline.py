@@ -103,6 +103,7 @@ def map_recording(
                 described = [Path(payload)] if isinstance(payload, (str, Path)) else []
                 folder.add_inputs([*recording.paths, *described])
                 prior = None if prior_map is None else _prior(Path(prior_map), folder)
+                folder.add_recordings(recording.paths, recording.clock.start_ns)
             checkpoint = Checkpoint(folder)
             done = checkpoint.restore(run) if resume else None
             if done is None:

@@ -60,6 +60,8 @@ class RunFolder:
             "command": sys.argv,
             "settings": settings or {},
             "inputs": [],
+            "recordings": [],
+            "start_ns": None,
             "files": [],
             "counts": {},
             "timings": {},
@@ -115,6 +117,16 @@ class RunFolder:
             path = Path(path)
             files = sorted(path.rglob("*")) if path.is_dir() else [path]
             self.record["inputs"] += [describe_input(file) for file in files if file.is_file()]
+
+    def add_recordings(self, paths: Iterable[Path], start_ns: int) -> None:
+        """Record where the recordings lie, so that their points can be read again, and their clock.
+
+        Parameters
+        ----------
+        start_ns : what is time zero, ns UTC
+        """
+        self.record["recordings"] = [str(Path(path).resolve()) for path in paths]
+        self.record["start_ns"] = start_ns
 
     def add_estimate(self, estimate: Estimate) -> None:
         """Record what the estimator says about itself."""

@@ -17,6 +17,7 @@ COMMANDS = {
         "localize_command",
         "Find a recording in a map, and what has changed.",
     ),
+    "merge": ("merge", "merge_command", "Put several runs into one map."),
     "info": ("info", "info", "Tell whether a recording is fit for mapping."),
     "plan": ("plan", "plan_command", "Plan a flight: how fast to spin, what will be seen."),
     "evaluate": (

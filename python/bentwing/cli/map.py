@@ -4,14 +4,17 @@
 from __future__ import annotations
 
 from pathlib import Path  # noqa: TC003 - typer reads the annotations
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 
 def map_command(
     recording: Annotated[
-        list[Path] | None, typer.Argument(help="Recording, or its consecutive parts.")
+        list[Path] | None,
+        typer.Argument(
+            help="Recording, or its consecutive parts; several flights are mapped and merged."
+        ),
     ] = None,
     *,
     out: Annotated[Path | None, typer.Option("-o", "--out", help="Folder to write into.")] = None,
@@ -48,9 +51,12 @@ def map_command(
 ) -> None:
     """Turn a recording into a trajectory, a map and a report."""
     # slow to import, so only when it is needed
+    from bentwing.cli.merge import say_maps
     from bentwing.errors import UsageError
+    from bentwing.flights import map_flights
     from bentwing.pipeline import map_recording
     from bentwing.progress import create_progress
+    from bentwing.recording.flights import flights_of
     from bentwing.run_settings import settings_text
 
     if print_settings:
@@ -59,19 +65,23 @@ def map_command(
     if not recording or out is None:
         msg = "a recording and a folder for the results are needed: bentwing map RECORDING -o OUT"
         raise UsageError(msg)
-    map_recording(
-        recording,
-        payload,
-        out,
-        estimator=estimator,
-        map_format=map_format,
-        map_spacing=map_spacing,
-        loop_closure=not no_loop_closure,
-        threads=threads,
-        start=start,
-        duration=duration,
-        resume=resume,
-        progress=create_progress(quiet=quiet),
-    )
+    options: dict[str, Any] = {
+        "estimator": estimator,
+        "map_format": map_format,
+        "map_spacing": map_spacing,
+        "loop_closure": not no_loop_closure,
+        "threads": threads,
+        "start": start,
+        "duration": duration,
+        "resume": resume,
+        "progress": create_progress(quiet=quiet),
+    }
+    flights = flights_of(recording) if len(recording) > 1 else [recording]
+    if len(flights) > 1:
+        merged = map_flights(flights, payload, out, **options)
+        if not quiet:
+            say_maps(merged)
+        return
+    map_recording(recording, payload, out, **options)
     if not quiet:
         typer.echo(f"{out}: open {out / 'report.html'}")

@@ -56,6 +56,7 @@ def simulate_command(  # noqa: PLR0917 - one parameter per option
     event: Annotated[
         list[str] | None, Option(help=f"Repeatable: {_names(EventName)}.", show_default=False)
     ] = None,
+    stall: Annotated[float, Option(help="How long the head stands still in spin-stall, s.")] = 4.0,
     *,
     calibrated: Annotated[
         bool, Option("--calibrated", help="The payload is exact, the clocks agree.")
@@ -73,6 +74,7 @@ def simulate_command(  # noqa: PLR0917 - one parameter per option
         "spin": spin,
         "max_range": max_range,
         "events": event or (),
+        "stall": stall,
         "flight": flight,
         "calibrated": calibrated,
     }

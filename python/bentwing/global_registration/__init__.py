@@ -4,8 +4,27 @@
 from __future__ import annotations
 
 from bentwing.global_registration.budget import Budget
-from bentwing.global_registration.closing import Closed, close_loops
+from bentwing.global_registration.closing import (
+    Closed,
+    Recorded,
+    Registered,
+    close_loops,
+    register_jointly,
+)
 from bentwing.global_registration.fixed import STAMP
 from bentwing.global_registration.settings import GlobalSettings
+from bentwing.global_registration.stretches import Collector, Inertial, Stretches
 
-__all__ = ["STAMP", "Budget", "Closed", "GlobalSettings", "close_loops"]
+__all__ = [
+    "STAMP",
+    "Budget",
+    "Closed",
+    "Collector",
+    "GlobalSettings",
+    "Inertial",
+    "Recorded",
+    "Registered",
+    "Stretches",
+    "close_loops",
+    "register_jointly",
+]

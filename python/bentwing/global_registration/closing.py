@@ -28,7 +28,7 @@ from bentwing.global_registration.stretches import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
     from bentwing.estimators.interface import Estimate
     from bentwing.recording import Batch, Payload
@@ -46,6 +46,37 @@ class Closed:
 
     estimate: Estimate
     record: dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Recorded:
+    """An estimate with what was measured along it.
+
+    Attributes
+    ----------
+    segments : the trajectory of each, where it is now, with the surfels that were seen along it
+    """
+
+    estimate: Estimate
+    payload: Payload
+    segments: list[Stretches]
+    inertial: Inertial
+
+
+@dataclass(frozen=True, slots=True)
+class Registered:
+    """What became of several estimates.
+
+    Attributes
+    ----------
+    estimates : corrected, or as they were where that failed
+    record : what was done, for run.json
+    failure : why nothing was corrected; None if it was
+    """
+
+    estimates: list[Estimate]
+    record: dict[str, Any]
+    failure: str | None = None
 
 
 def close_loops(
@@ -76,54 +107,103 @@ def close_loops(
     settings = settings or GlobalSettings()
     budget = budget or Budget.of(length_of(estimate), settings)
     started = time.perf_counter()
-    surfels = settings.surfels.model_copy(update={"max_rate": budget.rate})
-    pieces, inertial = collect(
+    segments, inertial = collect(
         batches,
         estimate,
         length=settings.stretch,
-        settings=surfels,
+        settings=settings.surfels.model_copy(update={"max_rate": budget.rate}),
         range_sigma=payload.lidar.range_sigma,
         threads=threads or 0,
     )
-    collected = time.perf_counter()
+    collected = time.perf_counter() - started
+    recorded = Recorded(estimate, payload, segments, inertial)
+    found = register_jointly(
+        [recorded], settings=settings, budget=budget, known=known, threads=threads
+    )
+    if "timings" in found.record:
+        found.record["timings"] = {"surfels": collected, **found.record["timings"]}
+    (closed,) = found.estimates
+    if found.failure is not None:
+        sentence = f"the loops were not closed, the trajectory is open-loop: {found.failure}"
+        closed = replace(closed, warnings=[*closed.warnings, sentence])
+    return Closed(closed, found.record)
+
+
+def register_jointly(
+    recorded: Sequence[Recorded],
+    *,
+    settings: GlobalSettings | None = None,
+    budget: Budget | None = None,
+    known: _core.Surfels | None = None,
+    threads: int | None = None,
+) -> Registered:
+    """Correct estimates by everything that any of them saw more than once (Kaul 2015, section 2.2).
+
+    Parameters
+    ----------
+    recorded : roughly aligned with each other; the first one defines the map
+    budget : what may be held; default: that of the settings for all of them together
+    known : as of `close_loops`; where there are any they define the map
+    threads : default: all cores
+    """
+    settings = settings or GlobalSettings()
+    seconds = sum(length_of(r.estimate) for r in recorded)
+    budget = budget or Budget.of(seconds, settings)
+    estimates = [r.estimate for r in recorded]
     record: dict[str, Any] = {"applied": False, "budget": budget}
-    if not any(p.surfels for p in pieces):
-        return _unchanged(estimate, record, "there are no points along the trajectory")
+    if not any(s.surfels for r in recorded for s in r.segments):
+        return _failed(estimates, record, "there are no points along the trajectory")
+    started = time.perf_counter()
     fixed = [] if known is None else [fixed_piece(known)]
     try:
         found = _core.register_globally(
-            [*fixed, *(_piece(p, inertial, estimate, payload) for p in pieces)],
+            [*fixed, *(_piece(s, r) for r in recorded for s in r.segments)],
             settings=CoreSettings.of(
-                settings.registration(budget.seconds), payload, interval_of(estimate)
+                settings.registration(budget.seconds),
+                _cautious([r.payload for r in recorded]),
+                max(interval_of(e) for e in estimates),
             ),
             plan=MatchingPlan(settings.n_visits, settings.min_overlap, HELD),
             threads=threads or 0,
         )
     except EstimationError as error:
-        return _unchanged(estimate, record, str(error))
-    timings = {
-        "surfels": collected - started,
-        "register": time.perf_counter() - collected,
-    }
-    segments = [p.trajectory for p in pieces]
-    moved = found.samples[len(fixed) :]
-    record.update(record_of(found, segments, moved, timings))
+        return _failed(estimates, record, str(error))
+    timings = {"register": time.perf_counter() - started}
+    trajectories = [s.trajectory for r in recorded for s in r.segments]
+    record.update(record_of(found, trajectories, found.samples[len(fixed) :], timings))
     why = improved(found)
     if why:
-        return _unchanged(estimate, record, why)
+        return _failed(estimates, record, why)
     record["applied"] = True
-    return Closed(closed_estimate(estimate, found, segments, moved), record)
+    closed, first = [], len(fixed)
+    for r in recorded:
+        own = slice(first, first + len(r.segments))
+        closed.append(closed_estimate(r.estimate, found, [s.trajectory for s in r.segments], own))
+        first = own.stop
+    return Registered(closed, record)
 
 
-def _unchanged(estimate: Estimate, record: dict[str, Any], why: str) -> Closed:
+def _failed(estimates: list[Estimate], record: dict[str, Any], why: str) -> Registered:
     record["reason"] = why
-    sentence = f"the loops were not closed, the trajectory is open-loop: {why}"
-    return Closed(replace(estimate, warnings=[*estimate.warnings, sentence]), record)
+    return Registered(estimates, record, why)
 
 
-def _piece(
-    stretches: Stretches, inertial: Inertial, estimate: Estimate, payload: Payload
-) -> _core.Piece:
+def _cautious(payloads: Sequence[Payload]) -> Payload:
+    """Return the first payload with the largest noise of all, as rows of all have one weight."""
+    first = payloads[0]
+    sigma = max(p.lidar.range_sigma for p in payloads)
+    update: dict[str, Any] = {"lidar": first.lidar.model_copy(update={"range_sigma": sigma})}
+    imus = [p.imu for p in payloads if p.imu is not None]
+    if imus:
+        noises = {
+            name: max(getattr(imu, name) for imu in imus) for name in ("gyro_noise", "accel_noise")
+        }
+        update["imu"] = imus[0].model_copy(update=noises)
+    return first.model_copy(update=update)
+
+
+def _piece(stretches: Stretches, recorded: Recorded) -> _core.Piece:
+    estimate, inertial, payload = recorded.estimate, recorded.inertial, recorded.payload
     used = has_inertial_states(estimate) and payload.imu is not None and len(inertial.times) > 0
     # The map is level, and stays so: gravity is where it belongs, the trajectory may tilt.
     known = [name for name in SLICES if name not in estimate.calibration.std]

@@ -48,21 +48,21 @@ def closed_estimate(
     estimate: Estimate,
     found: _core.GlobalRegistration,
     segments: Sequence[Trajectory],
-    corrected: Sequence[_core.Samples],
+    own: slice,
 ) -> Estimate:
     """Return the estimate with corrected segments and calibration.
 
     Parameters
     ----------
     segments : of the estimate, as they were registered
-    corrected : the same in the result
+    own : which pieces of the result they are
     """
     dt = interval_of(estimate)
     moved = [
         Trajectory(s.times, np.asarray(n.positions), np.asarray(n.quats_xyzw))
-        for s, n in zip(segments, corrected, strict=True)
+        for s, n in zip(segments, found.samples[own], strict=True)
     ]
-    slow, covariance = found.globals[-1], found.covariances[-1]
+    slow, covariance = found.globals[own][-1], found.covariances[own][-1]
     frozen = np.diag(covariance) == 0.0
     calibration = replace(
         estimate.calibration,

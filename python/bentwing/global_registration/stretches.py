@@ -81,15 +81,40 @@ def collect(
     batches : of the recording the estimate is of
     length : of a stretch, s
     """
-    maker = _Maker(estimate, length, settings, range_sigma, threads)
-    inertial: list[ImuBatch] = []
+    collector = Collector(
+        estimate, length=length, settings=settings, range_sigma=range_sigma, threads=threads
+    )
     for batch in batches:
+        collector.add(batch)
+    return collector.result()
+
+
+class Collector:
+    """The same, batch by batch as they come; parameters as of `collect`."""
+
+    def __init__(
+        self,
+        estimate: Estimate,
+        *,
+        length: float,
+        settings: SurfelSettings,
+        range_sigma: float,
+        threads: int,
+    ) -> None:
+        self._maker = _Maker(estimate, length, settings, range_sigma, threads)
+        self._inertial: list[ImuBatch] = []
+
+    def add(self, batch: Batch) -> None:
+        """Take the next batch of the recording."""
         if isinstance(batch, ImuBatch):
-            inertial.append(batch)
+            self._inertial.append(batch)
         elif isinstance(batch, LidarBatch) and len(batch.times):
-            maker.add(batch)
-    maker.finish()
-    return maker.found, _joined(inertial)
+            self._maker.add(batch)
+
+    def result(self) -> tuple[list[Stretches], Inertial]:
+        """Finish with what was added."""
+        self._maker.finish()
+        return self._maker.found, _joined(self._inertial)
 
 
 class _Maker:

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from bentwing.map.thin import VoxelSet, voxel_cells, voxel_keys
-from bentwing.places import FreeSpace, seen_through
+from bentwing.places import FreeSpace, positions_at, seen_through
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -157,9 +157,3 @@ def _not_alone(points: NDArray[np.float64]) -> NDArray[np.float64]:
     tree = cKDTree(points)
     n = tree.query_ball_point(points, _TOGETHER, return_length=True)
     return points[np.asarray(n) > _COMPANIONS]
-
-
-def positions_at(trajectory: Trajectory, times: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Positions (N, 3) m at times (N,) within the trajectory; rotations, which cost most, are not needed."""
-    axes = trajectory.positions.T
-    return np.column_stack([np.interp(times, trajectory.times, axis) for axis in axes])

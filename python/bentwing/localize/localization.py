@@ -6,12 +6,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from bentwing.errors import EstimationError
 from bentwing.localize.placement import place_in_map
 from bentwing.map.project import project
-from bentwing.places import PlaceSettings, describe_run, match_places
+from bentwing.places import PartStream, describe_parts, match_places
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -96,23 +94,12 @@ class NotInMapError(EstimationError):
 
 def _described(chunks: Iterable[MapChunk], estimate: Estimate) -> list[Place]:
     """Describe the places of a stream of points, one place at a time."""
-    settings = PlaceSettings()
-    places: list[Place] = []
-    held: list[MapChunk] = []
+    poses = estimate.trajectory
+    spans = estimate.segments or [(float(poses.times[0]), float(poses.times[-1]))]
+    stream, places = PartStream(poses, spans), list[Any]()
     for chunk in chunks:
-        held.append(chunk)
-        if chunk.times[-1] - held[0].times[0] >= settings.duration:
-            places += _place(held, estimate, settings)
-            held = []
-    return places + _place(held, estimate, settings)
-
-
-def _place(held: Sequence[MapChunk], estimate: Estimate, settings: PlaceSettings) -> list[Place]:
-    if not held:
-        return []
-    points = np.concatenate([chunk.points for chunk in held])
-    times = np.concatenate([chunk.times for chunk in held])
-    return describe_run(points, times, estimate.trajectory, settings)
+        places += describe_parts(stream.add(chunk.points, chunk.times))
+    return [*places, *describe_parts(stream.finish())]
 
 
 def _candidate(candidate: Candidate, places: Sequence[Place]) -> dict[str, Any]:

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bentwing.errors import InputError
-from bentwing.localize.difference import ReferenceCloud, positions_at
+from bentwing.localize.difference import ReferenceCloud
 from bentwing.localize.map_surfels import MapSurfels, SurfelMaker, core_surfels
 from bentwing.map.read import read_parts
-from bentwing.places import map_of_run, places_of_cloud, places_of_run
+from bentwing.places import map_of_run, places_of_cloud, places_of_run, positions_at
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

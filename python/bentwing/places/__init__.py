@@ -8,7 +8,7 @@ the reason why it was believed or not.
 
 from __future__ import annotations
 
-from bentwing.places.cut import Part, cut_places, describe_parts, describe_run
+from bentwing.places.cut import Part, cut_places, describe_parts, describe_run, positions_at
 from bentwing.places.free_space import FreeSpace, seen_through
 from bentwing.places.from_run import RunMap, map_of_run, places_of_cloud, places_of_run
 from bentwing.places.link import PlaceLink, link_between
@@ -17,6 +17,7 @@ from bentwing.places.metric import Metric, default_metric, learn_metric
 from bentwing.places.place import Place, make_place
 from bentwing.places.refine import Alignment
 from bentwing.places.settings import MatchSettings, PlaceSettings
+from bentwing.places.stream import PartStream
 from bentwing.places.verify import Agreement
 
 __all__ = [
@@ -27,6 +28,7 @@ __all__ = [
     "MatchSettings",
     "Metric",
     "Part",
+    "PartStream",
     "Place",
     "PlaceLink",
     "PlaceSettings",
@@ -42,5 +44,6 @@ __all__ = [
     "match_places",
     "places_of_cloud",
     "places_of_run",
+    "positions_at",
     "seen_through",
 ]

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
     from bentwing.trajectory import Trajectory
 
-_MIN_POINTS = 500  # a place of fewer says nothing
-_PAUSE = 2.0  # s without points, after which another place begins
+MIN_POINTS = 500  # a place of fewer says nothing
+PAUSE = 2.0  # s without points, after which another place begins
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,10 +73,10 @@ def cut_places(
         Part(
             points[first:last],
             (float(times[first]), float(times[last - 1])),
-            None if trajectory is None else _positions(trajectory, times[first:last]),
+            None if trajectory is None else positions_at(trajectory, times[first:last]),
         )
         for first, last in zip([0, *cuts], [*cuts, len(times)], strict=True)
-        if last - first >= _MIN_POINTS
+        if last - first >= MIN_POINTS
     ]
 
 
@@ -105,18 +105,25 @@ def _cuts(
     """Find the times at which another place begins, without that of the first."""
     if not len(times):
         return []
-    pauses = np.flatnonzero(np.diff(times) > _PAUSE)
+    pauses = np.flatnonzero(np.diff(times) > PAUSE)
     starts = [float(times[0]), *times[pauses + 1].tolist()]
     ends = [*times[pauses].tolist(), float(times[-1])]
     cuts: list[float] = []
     for start, end in zip(starts, ends, strict=True):
-        way = _way(trajectory, start, end)
-        n = max(1, round((end - start) / settings.duration), int(np.ceil(way / settings.tile)))
-        cuts += [start + (end - start) * k / n for k in range(n)]
+        cuts += place_starts(trajectory, start, end, settings)
     return cuts[1:]
 
 
-def _positions(trajectory: Trajectory, times: NDArray[np.float64]) -> NDArray[np.float64]:
+def place_starts(
+    trajectory: Trajectory | None, start: float, end: float, settings: PlaceSettings
+) -> list[float]:
+    """Return the times at which the places between two times begin, s."""
+    way = _way(trajectory, start, end)
+    n = max(1, round((end - start) / settings.duration), int(np.ceil(way / settings.tile)))
+    return [start + (end - start) * k / n for k in range(n)]
+
+
+def positions_at(trajectory: Trajectory, times: NDArray[np.float64]) -> NDArray[np.float64]:
     """Positions (N, 3) at increasing times inside; rotations, which cost most, are not needed."""
     return np.column_stack(
         [np.interp(times, trajectory.times, trajectory.positions[:, axis]) for axis in range(3)]
@@ -128,7 +135,7 @@ def _way(trajectory: Trajectory | None, start: float, end: float) -> float:
     if trajectory is None or end <= start:
         return 0.0
     at = np.linspace(start, end, max(2, int(end - start) + 1))
-    return float(np.linalg.norm(np.diff(_positions(trajectory, at), axis=0), axis=1).sum())
+    return float(np.linalg.norm(np.diff(positions_at(trajectory, at), axis=0), axis=1).sum())
 
 
 def _tiles(points: NDArray[np.float64], tile: float) -> Iterator[Part]:
@@ -143,7 +150,7 @@ def _tiles(points: NDArray[np.float64], tile: float) -> Iterator[Part]:
     order = np.lexsort(cells.T)
     changes = np.flatnonzero((np.diff(cells[order], axis=0) != 0).any(axis=1)) + 1
     for rows in np.split(order, changes):
-        if len(rows) >= _MIN_POINTS:
+        if len(rows) >= MIN_POINTS:
             yield Part(points[rows], None, None)
 
 

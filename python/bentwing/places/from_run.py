@@ -12,7 +12,8 @@ import numpy as np
 from bentwing.errors import UsageError
 from bentwing.map.gps_time import adjusted_gps_origin
 from bentwing.map.read import MAP_SUFFIXES, read_parts, read_points
-from bentwing.places.cut import describe_run
+from bentwing.places.cut import describe_parts, describe_run
+from bentwing.places.stream import PartStream
 from bentwing.run_folder import read_record
 from bentwing.trajectory import Trajectory, read_tum
 
@@ -33,10 +34,12 @@ class RunMap:
     ----------
     path : of the map's file
     trajectory : on the clock of the run
+    segments : first and last time of each stretch of it without a break, s
     """
 
     path: Path
     trajectory: Trajectory
+    segments: list[tuple[float, float]]
     _origin: float
 
     def parts(self) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64] | None]]:
@@ -50,12 +53,6 @@ class RunMap:
         for part in read_parts(self.path):
             yield part.points, None if part.times is None else part.times - self._origin
 
-    def gathered(self) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
-        """Return all points, and all times if the map has any."""
-        parts = list(self.parts())
-        times = [t for _, t in parts if t is not None]
-        return np.concatenate([p for p, _ in parts]), np.concatenate(times) if times else None
-
 
 def map_of_run(folder: Path) -> RunMap:
     """Find the map of a run folder.
@@ -68,7 +65,8 @@ def map_of_run(folder: Path) -> RunMap:
         If its trajectory cannot be read.
     """
     folder = Path(folder)
-    begin = float((read_record(folder).get("segments") or [[0.0]])[0][0])
+    segments = [(float(a), float(b)) for a, b in read_record(folder).get("segments") or []]
+    begin = segments[0][0] if segments else 0.0
     path = next((p for s in MAP_SUFFIXES if (p := folder / f"map{s}").exists()), None)
     if path is None:
         msg = f"{folder}: the run has no map; run `bentwing map` again, to its end"
@@ -77,7 +75,7 @@ def map_of_run(folder: Path) -> RunMap:
     trajectory = Trajectory(absolute.times + begin, absolute.positions, absolute.quats_xyzw)
     is_las = path.suffix in {".laz", ".las"}
     origin = adjusted_gps_origin(first_ns - round(begin * 1e9)) if is_las else 0.0
-    return RunMap(path, trajectory, origin)
+    return RunMap(path, trajectory, segments, origin)
 
 
 def places_of_run(folder: Path, settings: PlaceSettings | None = None) -> list[Place]:
@@ -91,8 +89,15 @@ def places_of_run(folder: Path, settings: PlaceSettings | None = None) -> list[P
         If its trajectory or its map cannot be read.
     """
     run = map_of_run(folder)
-    points, times = run.gathered()
-    return describe_run(points, times, None if times is None else run.trajectory, settings)
+    poses = run.trajectory
+    spans = run.segments or [(float(poses.times[0]), float(poses.times[-1]))]
+    stream = PartStream(poses, spans, settings)
+    places: list[Place] = []
+    for points, times in run.parts():
+        if times is None:
+            return places_of_cloud(run.path, settings)
+        places += describe_parts(stream.add(points, times), settings)
+    return [*places, *describe_parts(stream.finish(), settings)]
 
 
 def places_of_cloud(path: Path, settings: PlaceSettings | None = None) -> list[Place]:

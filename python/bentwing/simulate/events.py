@@ -26,7 +26,7 @@ EventName = Literal[
 ]
 
 STALL = 4.0
-"""s, how long the head does not turn."""
+"""s, how long the head does not turn where nothing else is asked for."""
 GAP = 1.5
 """s, how long nothing is recorded."""
 LEAD = 14.0
@@ -35,10 +35,10 @@ WALK_SPEED = 1.1
 BURST_CHANCE = 0.01
 
 
-def turning(times: Array, duration: float) -> Array:
-    """Share of the head's drive (N,): zero for `STALL` seconds in the middle, else one."""
+def turning(times: Array, duration: float, stall: float = STALL) -> Array:
+    """Share of the head's drive (N,): zero for `stall` seconds from the middle on, else one."""
     off = 0.55 * duration
-    return np.where((times > off) & (times < off + STALL), 0.0, 1.0)
+    return np.where((times > off) & (times < off + stall), 0.0, 1.0)
 
 
 def gust_shifts(rng: np.random.Generator, times: Array, start: float, end: float) -> Array:

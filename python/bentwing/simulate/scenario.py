@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from bentwing.simulate.events import GAP, LEAD, EventName, Losses, Person, strong_bias
+from bentwing.simulate.events import GAP, LEAD, STALL, EventName, Losses, Person, strong_bias
 from bentwing.simulate.heads.build import build_rig
 from bentwing.simulate.imu import PERFECT, Imu, ImuErrors
 from bentwing.simulate.lidars.interface import LidarClock
@@ -49,6 +49,7 @@ class Scenario(BaseModel):
         of downdraft, vanes and controller
     max_range : m, beyond it the lidar sees nothing; by default what the sensor can do
     events : what goes wrong
+    stall : s, how long the head does not turn in the event `spin-stall`
     flight : a tour from the ground and back, or the site's line in the air (town, walls, dam)
     calibrated : whether the payload has the head as it is, and the clocks agree
     noiseless : without random errors of the sensors (calibration and clock stay wrong)
@@ -66,6 +67,7 @@ class Scenario(BaseModel):
     spin: SpinName = "steady"
     max_range: float | None = Field(default=None, gt=1.0)
     events: tuple[EventName, ...] = ()
+    stall: float = Field(default=STALL, gt=0.0, le=60.0)
     flight: FlightName = "tour"
     calibrated: bool = False
     noiseless: bool = False

@@ -79,4 +79,5 @@ def _nodding(scenario: Scenario, world: World, rng: np.random.Generator, duratio
 def _drive(scenario: Scenario, step: float, duration: float) -> Array:
     """How much the head is driven at the knots of its angle, 0 … 1."""
     knots = knot_times(step, duration)
-    return turning(knots, duration) if "spin-stall" in scenario.events else np.ones(len(knots))
+    stalls = "spin-stall" in scenario.events
+    return turning(knots, duration, scenario.stall) if stalls else np.ones(len(knots))

@@ -88,7 +88,6 @@ class MapSurvey:
     edge : m, of the cells
     max_cells : more are joined eight to one
     start, step : s, first time and length of the 256 steps of time
-    ray_share : share of the beams that is followed
     max_rays : more beams are thinned by half
     margin : m, a beam says nothing about what is closer to its end
     """
@@ -100,7 +99,6 @@ class MapSurvey:
         max_cells: int,
         start: float,
         step: float,
-        ray_share: float,
         max_rays: int,
         margin: float,
     ) -> MapSurvey: ...

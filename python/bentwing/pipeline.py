@@ -12,6 +12,7 @@ from bentwing import estimators
 from bentwing.checkpoint import Checkpoint
 from bentwing.errors import EstimationError
 from bentwing.global_registration import Budget, GlobalSettings, close_loops
+from bentwing.map.clean import CleanSettings, clean
 from bentwing.map.project import project
 from bentwing.map.sample import MapSample
 from bentwing.map.thin import thin
@@ -41,6 +42,7 @@ def map_recording(
     estimator: str = "continuous",
     map_format: str = "laz",
     map_spacing: float = 0.0,
+    cleaning: CleanSettings | None = None,
     loop_closure: bool = True,
     settings: Any = None,  # noqa: ANN401 - each estimator has its own model
     threads: int | None = None,
@@ -59,6 +61,7 @@ def map_recording(
     estimator : one of `estimators.AVAILABLE_ESTIMATORS`
     map_format : one of `MAP_FORMATS`
     map_spacing : m, edge of the voxels that keep one point each; 0 keeps all points
+    cleaning : what is left out of the map; default: mixed pixels and what moved
     loop_closure : whether places seen again may correct the trajectory
     settings : of the estimator; default: its defaults
     threads : of the estimator; default: all cores
@@ -79,6 +82,7 @@ def map_recording(
         "estimator": estimator,
         "map_format": map_format,
         "map_spacing": map_spacing,
+        "cleaning": plain(cleaning or CleanSettings()),
         "loop_closure": plain(GlobalSettings()) if loop_closure else False,
         "threads": threads,
         "start": start,
@@ -166,11 +170,21 @@ def _write_map(
         threads=asked["threads"],
         counts=counts,
     )
-    chunks = thin(chunks, asked["map_spacing"], counts)
     path = folder.file(f"map.{asked['map_format']}")
+    chunks = clean(
+        chunks,
+        path,
+        duration=part.length,
+        settings=CleanSettings(**asked["cleaning"]),
+        counts=counts,
+        record=folder.record["map"],
+        threads=asked["threads"],
+    )
+    chunks = thin(chunks, asked["map_spacing"], counts)
     with open_map(path, asked["map_format"], part.recording.clock.start_ns) as writer:
         for chunk in run.sample.watch(chunks):
             writer.write(chunk)
+    counts["map.written"] = writer.n_points
 
 
 @contextmanager

@@ -66,6 +66,7 @@ class RunFolder:
             "warnings": [],
             "calibration": None,
             "loop_closure": None,
+            "map": {},
             "segments": [],
             "windows": [],
             "peak_memory_mb": None,

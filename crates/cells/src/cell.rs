@@ -52,10 +52,8 @@ impl Sums {
         }
         let pairs = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
         for (k, (i, j)) in pairs.into_iter().enumerate() {
-            self.products[k] += other.products[k]
-                + s[i] * shift[j]
-                + shift[i] * s[j]
-                + n * shift[i] * shift[j];
+            self.products[k] +=
+                other.products[k] + s[i] * shift[j] + shift[i] * s[j] + n * shift[i] * shift[j];
         }
     }
 
@@ -174,7 +172,10 @@ mod tests {
     #[test]
     fn the_plane_of_a_noisy_tilted_patch_has_its_normal_and_thickness() {
         let normal = Vector3::new(1.0, -2.0, 2.0) / 3.0;
-        let (u, v) = (Vector3::new(2.0, 2.0, 1.0) / 3.0, Vector3::new(-2.0, 1.0, 2.0) / 3.0);
+        let (u, v) = (
+            Vector3::new(2.0, 2.0, 1.0) / 3.0,
+            Vector3::new(-2.0, 1.0, 2.0) / 3.0,
+        );
         let mut sums = Sums::default();
         for i in 0..20 {
             for j in 0..20 {
@@ -209,7 +210,8 @@ mod tests {
         let down = Vector3::new(0.0, 0.0, -1.0);
         let from = |x| Vector3::new(x, 0.045, 2.0);
         assert!(core.is_some_and(|c| {
-            c.crossing(&from(0.05), &down).is_some_and(|t| (t - 2.0).abs() < 1e-9)
+            c.crossing(&from(0.05), &down)
+                .is_some_and(|t| (t - 2.0).abs() < 1e-9)
                 && c.crossing(&from(0.2), &down).is_none()
         }));
     }

@@ -12,7 +12,7 @@ const CHUNK: usize = 4096;
 const OFF_THICKNESSES: f32 = 3.0;
 const OFF: f32 = 0.04;
 /// So many points in a cell support each other.
-const SUPPORT: f64 = 5.0;
+const SUPPORT: f64 = 2.0;
 
 /// Cells of a complete survey.
 #[derive(Clone, Debug)]
@@ -131,13 +131,19 @@ impl Cells {
         let is_moving =
             found.is_moving || is_off && plane.is_flat && self.moves_towards(p, &n, height);
         let incidence = cosine.abs().min(1.0).acos();
-        (incidence, plane.thickness, is_moving, !is_off || found.is_supported)
+        (
+            incidence,
+            plane.thickness,
+            is_moving,
+            !is_off || found.is_supported,
+        )
     }
 
     fn moves_towards(&self, p: &[f64; 3], normal: &[f32; 3], height: f32) -> bool {
         let reach = self.edge.copysign(f64::from(height));
         let beside = [0, 1, 2].map(|a| p[a] + f64::from(normal[a]) * reach);
-        self.at(cell_of(&beside, self.edge)).is_some_and(|f| f.is_moving)
+        self.at(cell_of(&beside, self.edge))
+            .is_some_and(|f| f.is_moving)
     }
 
     fn at(&self, cell: [i64; 3]) -> Option<&Found> {
@@ -146,20 +152,52 @@ impl Cells {
     }
 }
 
+/// A wall that lies on the border of cells is in two of them, each with a half of its noise: points
+/// beside a cell join it where its surface becomes thicker by no more than this.
+const JOINED_THICKER: f32 = 2.0;
+const JOINED_THICKER_BY: f32 = 0.005;
+
 /// The plane of a cell; where its own points have none, that of the points around it.
 fn plane_of(shards: &[Shard], edge: f64, s: usize, i: usize) -> Option<Plane> {
-    let own = &shards[s].cells[i].sums;
-    own.plane(edge).or_else(|| {
-        let [x, y, z] = shards[s].coordinates[i];
-        let mut sums = Sums::default();
-        for k in 0..27_i64 {
-            let offset = [k / 9 - 1, k / 3 % 3 - 1, k % 3 - 1];
-            let at = [x + offset[0], y + offset[1], z + offset[2]];
-            if let Some((s, i)) = block::find(shards, at) {
-                let shift = offset.map(|o| o as f64 * edge);
-                sums.add(&shards[s].cells[i as usize].sums, shift);
-            }
+    let mut sums = shards[s].cells[i].sums;
+    let at = shards[s].coordinates[i];
+    let Some(own) = sums.plane(edge) else {
+        for k in (0..27_i64).filter(|&k| k != 13) {
+            add_beside(
+                &mut sums,
+                shards,
+                edge,
+                at,
+                [k / 9 - 1, k / 3 % 3 - 1, k % 3 - 1],
+            );
         }
-        sums.plane(edge)
-    })
+        return sums.plane(edge);
+    };
+    let steepest = |a: usize, b: usize| {
+        if own.normal[b].abs() > own.normal[a].abs() {
+            b
+        } else {
+            a
+        }
+    };
+    let axis = steepest(steepest(0, 1), 2);
+    let mut plane = own;
+    for side in [-1, 1] {
+        let mut offset = [0; 3];
+        offset[axis] = side;
+        let mut joined = sums;
+        add_beside(&mut joined, shards, edge, at, offset);
+        let limit = JOINED_THICKER * own.thickness + JOINED_THICKER_BY;
+        if let Some(p) = joined.plane(edge).filter(|p| p.thickness < limit) {
+            (plane, sums) = (p, joined);
+        }
+    }
+    Some(plane)
+}
+
+fn add_beside(sums: &mut Sums, shards: &[Shard], edge: f64, at: [i64; 3], offset: [i64; 3]) {
+    if let Some((s, i)) = block::find(shards, [0, 1, 2].map(|a| at[a] + offset[a])) {
+        let shift = offset.map(|o| o as f64 * edge);
+        sums.add(&shards[s].cells[i as usize].sums, shift);
+    }
 }

@@ -50,44 +50,67 @@ fn seen_through(shards: &[Shard], edge: f64, rays: &[Ray], margin: f64) -> Vec<V
         .par_iter()
         .map(|shard| {
             let cells = shard.cells.iter();
-            cells.map(|c| (c.sums.core(edge), c.sums.plane(edge))).collect()
+            cells
+                .map(|c| (c.sums.core(edge), c.sums.plane(edge)))
+                .collect()
         })
         .collect();
     let marks: Vec<Vec<[AtomicU64; 4]>> = shards
         .iter()
-        .map(|shard| shard.cells.iter().map(|_| <[AtomicU64; 4]>::default()).collect())
+        .map(|shard| {
+            shard
+                .cells
+                .iter()
+                .map(|_| <[AtomicU64; 4]>::default())
+                .collect()
+        })
         .collect();
     // Setting bits gives the same in any order.
     rays.par_iter().with_min_len(CHUNK).for_each(|ray| {
         let origin = ray.origin.map(f64::from);
         let direction = ray.direction.map(f64::from);
         let reach = f64::from(ray.length) - margin;
-        walk(&origin, &direction, (0.0, reach), 4.0 * edge, |at, enter, leave| {
-            let key = key_of(at);
-            let shard = shard_of(key);
-            let Some(block) = shards[shard].block(key) else {
-                return;
-            };
-            walk(&origin, &direction, (enter, leave), edge, |cell, _, _| {
-                if cell.map(|c| c >> 2) != at {
-                    return; // a rounding error beyond the block's border
-                }
-                let [x, y, z] = cell.map(|c| (c & 3) as usize);
-                let Some(index) = present(block, x << 4 | y << 2 | z) else {
+        walk(
+            &origin,
+            &direction,
+            (0.0, reach),
+            4.0 * edge,
+            |at, enter, leave| {
+                let key = key_of(at);
+                let shard = shard_of(key);
+                let Some(block) = shards[shard].block(key) else {
                     return;
                 };
-                let (core, plane) = &shapes[shard][index as usize];
-                let middle = middle_of(cell, edge);
-                let from = Vector3::from([0, 1, 2].map(|a| origin[a] - middle[a]));
-                if passes(core.as_ref(), plane.as_ref(), &from, &direction.into(), reach) {
-                    let word = &marks[shard][index as usize][usize::from(ray.bin) / 64];
-                    word.fetch_or(1 << (ray.bin % 64), Ordering::Relaxed);
-                }
-            });
-        });
+                walk(&origin, &direction, (enter, leave), edge, |cell, _, _| {
+                    if cell.map(|c| c >> 2) != at {
+                        return; // a rounding error beyond the block's border
+                    }
+                    let [x, y, z] = cell.map(|c| (c & 3) as usize);
+                    let Some(index) = present(block, x << 4 | y << 2 | z) else {
+                        return;
+                    };
+                    let (core, plane) = &shapes[shard][index as usize];
+                    let middle = middle_of(cell, edge);
+                    let from = Vector3::from([0, 1, 2].map(|a| origin[a] - middle[a]));
+                    if passes(
+                        core.as_ref(),
+                        plane.as_ref(),
+                        &from,
+                        &direction.into(),
+                        reach,
+                    ) {
+                        let word = &marks[shard][index as usize][usize::from(ray.bin) / 64];
+                        word.fetch_or(1 << (ray.bin % 64), Ordering::Relaxed);
+                    }
+                });
+            },
+        );
     });
     let read = |cell: [AtomicU64; 4]| cell.map(AtomicU64::into_inner);
-    marks.into_iter().map(|shard| shard.into_iter().map(read).collect()).collect()
+    marks
+        .into_iter()
+        .map(|shard| shard.into_iter().map(read).collect())
+        .collect()
 }
 
 /// Whether a ray goes through the middle of what a cell holds.
@@ -108,9 +131,8 @@ fn passes(
 }
 
 fn flags(shards: &[Shard], is_so: impl Fn(usize, usize) -> bool + Sync) -> Vec<Vec<bool>> {
-    let of_shard = |(s, shard): (usize, &Shard)| {
-        (0..shard.cells.len()).map(|i| is_so(s, i)).collect()
-    };
+    let of_shard =
+        |(s, shard): (usize, &Shard)| (0..shard.cells.len()).map(|i| is_so(s, i)).collect();
     shards.par_iter().enumerate().map(of_shard).collect()
 }
 

@@ -25,13 +25,13 @@ pub(crate) struct RaySample {
 }
 
 impl RaySample {
-    /// `share` of the rays is kept, and at most `most`.
-    pub(crate) fn new(most: usize, share: f64) -> Self {
+    /// At most `most` rays, and at least about half as many if there were.
+    pub(crate) fn new(most: usize) -> Self {
         Self {
             rays: Vec::new(),
             draws: Vec::new(),
             most,
-            limit: (share.clamp(0.0, 1.0) * f64::from(u32::MAX)) as u32,
+            limit: u32::MAX,
             n_seen: 0,
         }
     }
@@ -77,7 +77,7 @@ mod tests {
 
     #[test]
     fn a_sample_is_even_and_stays_below_its_limit() {
-        let mut sample = RaySample::new(1000, 0.5);
+        let mut sample = RaySample::new(1000);
         for i in 0..65_000_u16 {
             let ray = Ray {
                 origin: [0.0; 3],

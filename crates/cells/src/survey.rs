@@ -23,8 +23,6 @@ pub struct Settings {
     pub start: f64,
     /// Length of a step of time, s; there are 256, the last one takes all that is later.
     pub step: f64,
-    /// Share of the beams that is followed.
-    pub ray_share: f64,
     /// More beams are thinned by half.
     pub max_rays: usize,
     /// A beam says nothing about what is closer than this to its end, m.
@@ -47,7 +45,7 @@ impl Survey {
             settings,
             edge: settings.edge,
             shards: vec![Shard::default(); N_SHARDS],
-            rays: RaySample::new(settings.max_rays, settings.ray_share),
+            rays: RaySample::new(settings.max_rays),
         }
     }
 
@@ -78,25 +76,37 @@ impl Survey {
             .map(|&c| shard_of(block_of(c).0) as u8)
             .collect();
         let bins: Vec<u8> = times.iter().map(|&t| bin_of(t, &settings)).collect();
-        self.shards.par_iter_mut().enumerate().for_each(|(s, shard)| {
-            for (i, _) in shards.iter().enumerate().filter(|&(_, &k)| usize::from(k) == s) {
-                if doubtful[i] {
-                    continue;
+        self.shards
+            .par_iter_mut()
+            .enumerate()
+            .for_each(|(s, shard)| {
+                for (i, _) in shards
+                    .iter()
+                    .enumerate()
+                    .filter(|&(_, &k)| usize::from(k) == s)
+                {
+                    if doubtful[i] {
+                        continue;
+                    }
+                    let middle = middle_of(cells[i], edge);
+                    let p = [0, 1, 2].map(|a| points[i][a] - middle[a]);
+                    let cell = shard.cell_mut(cells[i]);
+                    cell.sums.add_point(p);
+                    set(&mut cell.hits, bins[i]);
                 }
-                let middle = middle_of(cells[i], edge);
-                let p = [0, 1, 2].map(|a| points[i][a] - middle[a]);
-                let cell = shard.cell_mut(cells[i]);
-                cell.sums.add_point(p);
-                set(&mut cell.hits, bins[i]);
-            }
-        });
+            });
         for i in 0..points.len() {
             self.rays.offer(|| {
                 let (p, d, length) = (points[i], beams[i], ranges[i]);
                 let reach = f64::from(length);
                 let origin = [0, 1, 2].map(|a| (p[a] - f64::from(d[a]) * reach) as f32);
                 let is_long = reach.is_finite() && reach > settings.margin;
-                is_long.then_some(Ray { origin, direction: d, length, bin: bins[i] })
+                is_long.then_some(Ray {
+                    origin,
+                    direction: d,
+                    length,
+                    bin: bins[i],
+                })
             });
         }
         while self.n_cells() > self.settings.max_cells {
@@ -106,9 +116,19 @@ impl Survey {
 
     /// Follows the beams and decides what moved.
     pub fn finish(self) -> Cells {
-        let (moving, n_moving) =
-            moving::find(&self.shards, self.edge, &self.rays.rays, self.settings.margin);
-        Cells::new(self.shards, self.edge, &moving, n_moving, self.rays.rays.len())
+        let (moving, n_moving) = moving::find(
+            &self.shards,
+            self.edge,
+            &self.rays.rays,
+            self.settings.margin,
+        );
+        Cells::new(
+            self.shards,
+            self.edge,
+            &moving,
+            n_moving,
+            self.rays.rays.len(),
+        )
     }
 
     /// Joins the cells eight to one.
@@ -120,7 +140,9 @@ impl Survey {
                 let above = at.map(|c| c >> 1);
                 let (from, to) = (middle_of(at, fine), middle_of(above, coarse));
                 let joined = shards[shard_of(block_of(above).0)].cell_mut(above);
-                joined.sums.add(&cell.sums, [0, 1, 2].map(|a| from[a] - to[a]));
+                joined
+                    .sums
+                    .add(&cell.sums, [0, 1, 2].map(|a| from[a] - to[a]));
                 for (a, b) in joined.hits.iter_mut().zip(cell.hits) {
                     *a |= b;
                 }

@@ -23,13 +23,12 @@ pub(crate) struct MapSurvey(Option<Survey>);
 #[pymethods]
 impl MapSurvey {
     #[new]
-    #[pyo3(signature = (*, edge, max_cells, start, step, ray_share, max_rays, margin))]
+    #[pyo3(signature = (*, edge, max_cells, start, step, max_rays, margin))]
     fn new(
         edge: f64,
         max_cells: usize,
         start: f64,
         step: f64,
-        ray_share: f64,
         max_rays: usize,
         margin: f64,
     ) -> PyResult<Self> {
@@ -44,7 +43,6 @@ impl MapSurvey {
             max_cells: max_cells.max(1),
             start: finite_number("start", start)?,
             step,
-            ray_share: finite_number("ray_share", ray_share)?,
             max_rays: max_rays.max(1),
             margin: finite_number("margin", margin)?,
         }))))
@@ -68,7 +66,9 @@ impl MapSurvey {
         let (times, doubtful) = (finite("times", &times, n)?, same("doubtful", &doubtful, n)?);
         require_rows("beams", beams.len(), n)?;
         let survey = self.0.as_mut().ok_or_else(finished)?;
-        in_pool(py, threads, || survey.add(points, beams, ranges, times, doubtful))
+        in_pool(py, threads, || {
+            survey.add(points, beams, ranges, times, doubtful)
+        })
     }
 
     /// Follows the beams; ends the survey.

@@ -24,7 +24,7 @@ EDGE = 0.2  # m; a cell holds a piece of a wall, and not two of them
 MAX_CELLS = 1_500_000  # about 300 bytes each while beams are followed
 N_STEPS = 256  # of time, in the cells
 MIN_STEP = 0.5  # s; within it a spinning lidar looks everywhere about once
-RAYS_PER_SECOND = 30_000
+RAYS_PER_SECOND = 20_000
 MAX_RAYS = 4_000_000  # 32 bytes each
 # A beam that ends closer to a surface may have been stopped by it, had the trajectory been exact.
 MARGIN = 2 * EDGE
@@ -104,15 +104,12 @@ def clean(
 
 
 def _survey(first: MapChunk, duration: float) -> _core.MapSurvey:
-    length = float(first.times[-1] - first.times[0])
-    rate = len(first) / length if length > 0 else float(RAYS_PER_SECOND)
     return _core.MapSurvey(
         edge=EDGE,
         max_cells=MAX_CELLS,
         start=float(first.times[0]),
         step=max(MIN_STEP, duration / N_STEPS),
-        ray_share=min(1.0, RAYS_PER_SECOND / rate),
-        max_rays=MAX_RAYS,
+        max_rays=int(min(MAX_RAYS, max(RAYS_PER_SECOND * duration, 1.0))),
         margin=MARGIN,
     )
 

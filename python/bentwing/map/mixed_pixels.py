@@ -13,6 +13,9 @@ if TYPE_CHECKING:
 # m; a return closer to one of its neighbours is on the same surface, and would blur it no more
 # than the noise of a time-of-flight lidar does.
 MIN_STEP = 0.1
+# On one side of an edge at least a surface goes on: its next step is at most this share of the
+# smaller one, or it is a return among leaves.
+GOES_ON = 0.3
 # A plane seen at a grazing angle has such steps as well. The inverse of its range is linear in the
 # angle, so its returns stay within this share of the smaller step of what their neighbours say.
 PLANAR = 0.35
@@ -25,7 +28,7 @@ def mixed_pixels(
     """Return which returns may be of two surfaces at once.
 
     A return is doubtful if it lies between its neighbours in the scan line, clearly behind the one
-    and before the other, and not on a plane with them.
+    and before the other, if a surface ends beside it, and if it is not on a plane with them.
 
     Parameters
     ----------
@@ -35,9 +38,9 @@ def mixed_pixels(
 
     Returns
     -------
-    (N,) bool; leaves and twigs are doubtful, too, so that further evidence must decide
+    (N,) bool; some twigs are doubtful, too, so that further evidence must decide
     """
-    if len(times) < 3:
+    if len(times) < 5:
         return np.zeros(len(times), dtype=np.bool_)
     if ring is None:
         return _between(points, times)
@@ -45,7 +48,7 @@ def mixed_pixels(
     doubtful = np.zeros(len(times), dtype=np.bool_)
     inside = _between(points.take(order, axis=0), times[order])
     same = ring[order]
-    inside[1:-1] &= (same[:-2] == same[1:-1]) & (same[2:] == same[1:-1])
+    inside[2:-2] &= (same[:-4] == same[2:-2]) & (same[4:] == same[2:-2])
     doubtful[order] = inside
     return doubtful
 
@@ -54,11 +57,13 @@ def _between(points: NDArray[np.float64], times: NDArray[np.float64]) -> NDArray
     x, y, z = points.T
     ranges = np.sqrt(x * x + y * y + z * z)
     steps = np.diff(ranges)
-    before, after = steps[:-1], steps[1:]
+    sizes = np.abs(steps)
     found = np.zeros(len(ranges), dtype=np.bool_)
-    smaller = np.minimum(np.abs(before), np.abs(after))
+    smaller = np.minimum(sizes[1:-2], sizes[2:-1])
+    is_between = (steps[1:-2] * steps[2:-1] > 0) & (smaller > MIN_STEP)
+    go_on = np.minimum(sizes[:-3], sizes[3:]) < GOES_ON * smaller
     # Few returns come so far, and only they are looked at closely.
-    at = 1 + np.flatnonzero((before * after > 0) & (smaller > MIN_STEP))
+    at = 2 + np.flatnonzero(is_between & go_on)
     if not len(at):
         return found
     # The beam times of all neighbours are alike; a longer pause is a new scan or lost returns.
@@ -70,7 +75,7 @@ def _between(points: NDArray[np.float64], times: NDArray[np.float64]) -> NDArray
     share = first / np.maximum(first + second, 1e-9)
     inverse = (1 - share) / ranges[at - 1] + share / ranges[at + 1]
     off = np.abs(ranges[at] - 1 / inverse)
-    found[at] = near & (off > PLANAR * smaller[at - 1])
+    found[at] = near & (off > PLANAR * smaller[at - 2])
     return found
 
 

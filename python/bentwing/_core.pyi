@@ -29,6 +29,8 @@ __all__ = [
     "KalmanFilter",
     "KalmanSweep",
     "LazCompressor",
+    "MapCells",
+    "MapSurvey",
     "NdtReference",
     "NdtRegistration",
     "Piece",
@@ -76,6 +78,77 @@ class LazCompressor:
 
     def finish(self, *, threads: int = 0) -> None:
         """Write what is held back and the table of chunks."""
+
+@final
+class MapSurvey:
+    """What the points of a map say about each other, chunk by chunk.
+
+    Parameters
+    ----------
+    edge : m, of the cells
+    max_cells : more are joined eight to one
+    start, step : s, first time and length of the 256 steps of time
+    max_rays : more beams are thinned by half
+    margin : m, a beam says nothing about what is closer to its end
+    """
+
+    def __new__(
+        cls,
+        *,
+        edge: float,
+        max_cells: int,
+        start: float,
+        step: float,
+        max_rays: int,
+        margin: float,
+    ) -> MapSurvey: ...
+    def add(
+        self,
+        points: NDArray[np.float64],
+        *,
+        beams: NDArray[np.float32],
+        ranges: NDArray[np.float32],
+        times: NDArray[np.float64],
+        doubtful: NDArray[np.bool_],
+        threads: int = 0,
+    ) -> None:
+        """Add points (N, 3) with the unit directions (N, 3), lengths and times of their beams."""
+
+    def finish(self, *, threads: int = 0) -> MapCells:
+        """Follow the beams; ends the survey."""
+
+@final
+class MapCells:
+    """Cells of a complete survey."""
+
+    @property
+    def edge(self) -> float:
+        """Edge of the cells, m: that asked for, or larger if there were too many."""
+
+    @property
+    def n_cells(self) -> int:
+        """Number of cells."""
+
+    @property
+    def n_moving(self) -> int:
+        """Number of cells whose content moved."""
+
+    @property
+    def n_rays(self) -> int:
+        """Number of beams that were followed."""
+
+    def describe(
+        self,
+        points: NDArray[np.float64],
+        *,
+        beams: NDArray[np.float32],
+        threads: int = 0,
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], NDArray[np.bool_]]:
+        """Return of each point incidence (rad), thickness (m), whether it moved and is supported.
+
+        Incidence and thickness are NaN where there is no surface; a point is supported where other
+        points say that there is something.
+        """
 
 @final
 class Scene:

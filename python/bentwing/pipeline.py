@@ -14,6 +14,7 @@ from bentwing.errors import EstimationError
 from bentwing.global_registration import Budget, GlobalSettings, close_loops
 from bentwing.localize import Difference, NotInMapError, find_in_map, read_prior_map
 from bentwing.map.chunk import untimed
+from bentwing.map.clean import CleanSettings, clean
 from bentwing.map.project import project
 from bentwing.map.sample import MapSample
 from bentwing.map.thin import thin
@@ -47,6 +48,7 @@ def map_recording(
     estimator: str = "continuous",
     map_format: str = "laz",
     map_spacing: float = 0.0,
+    cleaning: CleanSettings | None = None,
     loop_closure: bool = True,
     prior_map: Path | str | None = None,
     settings: Any = None,  # noqa: ANN401 - each estimator has its own model
@@ -66,6 +68,7 @@ def map_recording(
     estimator : one of `estimators.AVAILABLE_ESTIMATORS`
     map_format : one of `MAP_FORMATS`
     map_spacing : m, edge of the voxels that keep one point each; 0 keeps all points
+    cleaning : what is left out of the map; default: mixed pixels and what moved
     loop_closure : whether places seen again may correct the trajectory
     prior_map : a run folder or a cloud in which the recording is found, and with which it is registered:
         trajectory and map are then in its frame, and what has changed is written too
@@ -88,6 +91,7 @@ def map_recording(
         "estimator": estimator,
         "map_format": map_format,
         "map_spacing": map_spacing,
+        "cleaning": plain(cleaning or CleanSettings()),
         "loop_closure": plain(GlobalSettings()) if loop_closure or prior_map else False,
         "prior_map": None if prior_map is None else str(prior_map),
         "threads": threads,
@@ -227,15 +231,25 @@ def _write_map(
         counts=counts,
     )
     origin_ns = part.recording.clock.start_ns
+    path = folder.file(f"map.{map_format}")
+    chunks = clean(
+        chunks,
+        path,
+        duration=part.length,
+        settings=CleanSettings(**asked["cleaning"]),
+        counts=counts,
+        record=folder.record["map"],
+        threads=asked["threads"],
+    )
     difference = None
     if prior is not None:
         difference = Difference(prior.cloud, run.estimate.trajectory)
         chunks = difference.watch(chunks)
     chunks = thin(chunks, asked["map_spacing"], counts)
-    path = folder.file(f"map.{map_format}")
     with open_map(path, map_format, origin_ns) as writer:
         for chunk in run.sample.watch(chunks):
             writer.write(chunk)
+    counts["map.written"] = writer.n_points
     if difference is not None:
         folder.record["localization"] |= difference.record
         for name in ("appeared", "disappeared"):

@@ -69,6 +69,7 @@ class RunFolder:
             "calibration": None,
             "localization": None,
             "loop_closure": None,
+            "map": {},
             "segments": [],
             "windows": [],
             "peak_memory_mb": None,

@@ -9,6 +9,7 @@
 use pyo3::prelude::*;
 
 mod arrays;
+mod cells;
 mod errors;
 mod global;
 mod kalman;
@@ -24,6 +25,8 @@ mod trajectory;
 mod _core {
     use pyo3::prelude::*;
 
+    #[pymodule_export]
+    use crate::cells::{MapCells, MapSurvey};
     #[pymodule_export]
     use crate::global::{GlobalRegistration, Piece, register_globally};
     #[pymodule_export]

@@ -31,6 +31,12 @@ def map_command(
     map_spacing: Annotated[
         float, typer.Option(help="Keep one point per voxel of this edge in metres; 0 keeps all.")
     ] = 0.0,
+    keep_moving: Annotated[
+        bool, typer.Option("--keep-moving", help="Keep what beams went through at other times.")
+    ] = False,
+    keep_mixed: Annotated[
+        bool, typer.Option("--keep-mixed", help="Keep returns between two surfaces.")
+    ] = False,
     no_loop_closure: Annotated[
         bool, typer.Option("--no-loop-closure", help="Leave the trajectory open-loop.")
     ] = False,
@@ -54,6 +60,7 @@ def map_command(
     from bentwing.cli.merge import say_maps
     from bentwing.errors import UsageError
     from bentwing.flights import map_flights
+    from bentwing.map.clean import CleanSettings
     from bentwing.pipeline import map_recording
     from bentwing.progress import create_progress
     from bentwing.recording.flights import flights_of
@@ -69,6 +76,7 @@ def map_command(
         "estimator": estimator,
         "map_format": map_format,
         "map_spacing": map_spacing,
+        "cleaning": CleanSettings(mixed_pixels=not keep_mixed, moving=not keep_moving),
         "loop_closure": not no_loop_closure,
         "threads": threads,
         "start": start,

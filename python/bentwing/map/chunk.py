@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,6 +25,12 @@ class MapChunk:
     ranges : (N,) float32, m, distance from the lidar
     intensity : (N,) float32 or None, as the sensor reports it
     ring : (N,) uint16 or None, beam number
+    beams : (N, 3) float32 or None, unit direction from the lidar to the point, map frame
+    doubtful : (N,) bool or None, whether the return may be of two surfaces at once
+    incidence : (N,) float32 or None, rad, between beam and normal; NaN where there is no surface
+    thickness : (N,) float32 or None, m, standard deviation of the points around across the
+        surface; NaN where there is none
+    run_id : (N,) uint16 or None, of a map of several runs, which of them
     """
 
     points: NDArray[np.float64]
@@ -32,6 +38,11 @@ class MapChunk:
     ranges: NDArray[np.float32]
     intensity: NDArray[np.float32] | None = None
     ring: NDArray[np.uint16] | None = None
+    beams: NDArray[np.float32] | None = None
+    doubtful: NDArray[np.bool_] | None = None
+    incidence: NDArray[np.float32] | None = None
+    thickness: NDArray[np.float32] | None = None
+    run_id: NDArray[np.uint16] | None = None
 
     def __len__(self) -> int:
         return len(self.times)
@@ -39,13 +50,9 @@ class MapChunk:
     def where(self, keep: NDArray[np.bool_] | slice) -> MapChunk:
         """Return the points selected by a mask or a slice."""
         chosen = numbered(keep)
-        return MapChunk(
-            rows(self.points, chosen),
-            rows(self.times, chosen),
-            rows(self.ranges, chosen),
-            None if self.intensity is None else rows(self.intensity, chosen),
-            None if self.ring is None else rows(self.ring, chosen),
-        )
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        kept = {k: rows(v, chosen) for k, v in values.items() if v is not None}
+        return replace(self, **kept)
 
 
 def untimed(points: NDArray[np.float64]) -> MapChunk:

@@ -15,10 +15,20 @@ if TYPE_CHECKING:
     from bentwing.map.chunk import MapChunk
 
 _LARGEST_COUNT = 10**15
+_OPTIONAL = {
+    "intensity": "<f4",
+    "ring": "<u2",
+    "incidence": "<f4",
+    "thickness": "<f4",
+    "run_id": "<u2",
+}
 
 
 def row_type(first: MapChunk, coordinate: str) -> np.dtype[np.void]:
-    """Packed little-endian row: x y z (of type `coordinate`), time, range, intensity, ring."""
+    """Packed little-endian row: x y z (of type `coordinate`), time, and what the chunk has.
+
+    The angle of incidence is in degrees.
+    """
     fields = [
         ("x", coordinate),
         ("y", coordinate),
@@ -26,10 +36,7 @@ def row_type(first: MapChunk, coordinate: str) -> np.dtype[np.void]:
         ("time", "<f8"),
         ("range", "<f4"),
     ]
-    if first.intensity is not None:
-        fields.append(("intensity", "<f4"))
-    if first.ring is not None:
-        fields.append(("ring", "<u2"))
+    fields += [(name, kind) for name, kind in _OPTIONAL.items() if getattr(first, name) is not None]
     return np.dtype(fields)
 
 
@@ -39,9 +46,10 @@ def rows(chunk: MapChunk, dtype: np.dtype[np.void]) -> NDArray[np.void]:
     for axis, name in enumerate("xyz"):
         table[name] = chunk.points[:, axis]
     table["time"], table["range"] = chunk.times, chunk.ranges
-    for name, values in (("intensity", chunk.intensity), ("ring", chunk.ring)):
+    for name in _OPTIONAL:
+        values = getattr(chunk, name)
         if values is not None and name in (dtype.names or ()):
-            table[name] = values
+            table[name] = np.degrees(values) if name == "incidence" else values
     return table
 
 

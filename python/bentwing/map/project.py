@@ -10,6 +10,7 @@ import numpy as np
 from bentwing.estimators.core_states import core_globals, core_samples
 from bentwing.estimators.mount import MotorMount
 from bentwing.map.chunk import MapChunk
+from bentwing.map.mixed_pixels import mixed_pixels
 from bentwing.recording.batches import LidarBatch
 
 if TYPE_CHECKING:
@@ -33,6 +34,7 @@ def project(
     calibration: Calibration,
     *,
     segments: Sequence[tuple[float, float]] = (),
+    run_id: int = 0,
     threads: int | None = None,
     counts: dict[str, int] | None = None,
 ) -> Iterator[MapChunk]:
@@ -45,6 +47,7 @@ def project(
     calibration : latency and mount of the lidar
     segments : first and last time of each stretch of the trajectory without a break, s; default:
         all of it is one
+    run_id : number of the run in a map of several
     threads : default: all cores
     counts : receives `map.points`, `map.outside_trajectory` and `map.not_finite`
 
@@ -64,12 +67,19 @@ def project(
         batch = _placeable(batch, trajectory, segments, calibration, counts)
         if len(batch.times):
             angles = batch.angles if turned else None
+            ranges = _lengths(batch.points)
+            at = np.zeros_like(batch.points)
+            origins = samples.place(at, batch.times, angles, slow, threads=threads or 0)
+            points = samples.place(batch.points, batch.times, angles, slow, threads=threads or 0)
             yield MapChunk(
-                samples.place(batch.points, batch.times, angles, slow, threads=threads or 0),
+                points,
                 batch.times - calibration.latency,
-                _lengths(batch.points),
+                ranges,
                 batch.intensity,
                 batch.ring,
+                _directions(points - origins, ranges),
+                mixed_pixels(batch.points, batch.times, batch.ring),
+                run_id=np.full(len(ranges), run_id, np.uint16),
             )
 
 
@@ -99,6 +109,12 @@ def _lengths(points: NDArray[np.float64]) -> NDArray[np.float32]:
     x, y, z = points.T  # along rows of three np.linalg.norm takes several times longer
     lengths: NDArray[np.float64] = np.sqrt(x * x + y * y + z * z)
     return lengths.astype(np.float32)
+
+
+def _directions(
+    offsets: NDArray[np.float64], lengths: NDArray[np.float32]
+) -> NDArray[np.float32]:
+    return (offsets / np.maximum(lengths, np.float32(1e-6))[:, None]).astype(np.float32)
 
 
 def _gathered(batches: Iterable[Batch]) -> Iterator[LidarBatch]:

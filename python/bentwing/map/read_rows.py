@@ -25,6 +25,7 @@ PLY_TYPES = {
     "float": "f4", "double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2",
     "int32": "i4", "uint32": "u4", "float32": "f4", "float64": "f8",
 }  # fmt: skip
+PCD_OFFSET = "# add to x y z:"
 _TIME = "time"  # the column our own files have
 _MAX_HEADER_LINES = 1000
 
@@ -66,6 +67,7 @@ def _ply_vertices(path: Path, lines: list[list[str]]) -> tuple[str, int, list[tu
 def pcd_rows(path: Path) -> Iterator[Table]:
     """Read coordinates and times of a PCD file part by part."""
     with path.open("rb") as file:
+        offset = _pcd_offset(file)
         header = {words[0]: words[1:] for words in header_lines(path, file, "DATA")}
         kinds = zip(header["TYPE"], header["SIZE"], strict=True)
         counts = header.get("COUNT", ["1"] * len(header["FIELDS"]))
@@ -85,9 +87,20 @@ def pcd_rows(path: Path) -> Iterator[Table]:
             for i, (name, (kind, size), repeat) in enumerate(columns)
         ]
         if header["DATA"][0] == "binary":
-            yield from _binary_rows(path, file, np.dtype(fields), count)
+            for points, times in _binary_rows(path, file, np.dtype(fields), count):
+                yield points + offset, times
         else:
             yield _compressed_columns(path, file, np.dtype(fields), count)
+
+
+def _pcd_offset(file: BinaryIO) -> NDArray[np.float64]:
+    """Return what to add to the coordinates of one of our own maps; leaves the file where it is."""
+    start = file.tell()
+    lines = [file.readline(10_000) for _ in range(10)]
+    file.seek(start)
+    found = [line.decode("ascii", "replace")[len(PCD_OFFSET) :] for line in lines
+             if line.startswith(PCD_OFFSET.encode())]  # fmt: skip
+    return np.array(found[0].split(), np.float64) if found else np.zeros(3)
 
 
 def _compressed_columns(path: Path, file: BinaryIO, dtype: np.dtype[Any], count: int) -> Table:

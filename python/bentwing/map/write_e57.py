@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bentwing.errors import UsageError
-from bentwing.map.writer import MapWriter
+from bentwing.map.writer import MapWriter, round_offset
 
 if TYPE_CHECKING:
     from bentwing.map.chunk import MapChunk
@@ -40,6 +40,9 @@ class E57Writer(MapWriter):
         pye57 = require_pye57()
         self._has_intensity = first.intensity is not None
         self._file = pye57.E57(str(self._temporary), mode="w")
+        if self.crs_wkt is not None:
+            node = pye57.libe57.StringNode(self._file.image_file, self.crs_wkt)
+            self._file.root.set("coordinateMetadata", node)
         self._waiting: list[MapChunk] = []
         self._n_waiting = 0
 
@@ -59,6 +62,9 @@ class E57Writer(MapWriter):
 
     def _write_scan(self) -> None:
         points = np.concatenate([chunk.points for chunk in self._waiting])
+        # pye57 stores single precision, so the scan's pose takes what is large.
+        offset = round_offset(points)
+        points -= offset
         columns = {f"cartesian{axis}": points[:, i].copy() for i, axis in enumerate("XYZ")}
         if self._has_intensity:
             intensity = [
@@ -66,5 +72,5 @@ class E57Writer(MapWriter):
                 for chunk in self._waiting
             ]
             columns["intensity"] = np.concatenate(intensity)
-        self._file.write_scan_raw(columns, name="bentwing map")
+        self._file.write_scan_raw(columns, name="bentwing map", translation=offset)
         self._waiting, self._n_waiting = [], 0

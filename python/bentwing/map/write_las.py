@@ -1,17 +1,18 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""LAS 1.4 and LAZ maps, point format 6 with the range and the ring as extra dimensions."""
+"""LAS 1.4 and LAZ maps, point format 6 with what else is known as extra dimensions."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import laspy
 import numpy as np
+from laspy.vlrs.known import WktCoordinateSystemVlr
 
 from bentwing.errors import EstimationError
 from bentwing.map.compress_laz import LazBackend
 from bentwing.map.gps_time import adjusted_gps_origin
-from bentwing.map.writer import MapWriter
+from bentwing.map.writer import MapWriter, round_offset
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -21,8 +22,14 @@ if TYPE_CHECKING:
     from bentwing.map.chunk import MapChunk
 
 SCALE = 0.0001  # m; 0.05 mm of rounding at most, 214 km in each direction of the offset
-_OFFSET_STEP = 1000.0  # m; a local map gets offset 0, a georeferenced one a round number
 _MAX_INTENSITY = 65_535
+# Type and description (32 characters at most) of what only some maps have.
+_EXTRA: dict[str, tuple[type[np.generic], str]] = {
+    "ring": (np.uint16, "beam number"),
+    "incidence": (np.float32, "deg between beam and normal"),
+    "thickness": (np.float32, "m, 1 sigma across the surface"),
+    "run_id": (np.uint16, "number of the run"),
+}
 _ONLY_RETURN = 0x11  # return number 1 in the lower four bits, number of returns 1 in the upper
 
 
@@ -35,12 +42,12 @@ class LasWriter(MapWriter):
 
     compressed = False
 
-    def __init__(self, path: Path, clock_origin_ns: int) -> None:
-        super().__init__(path, clock_origin_ns)
+    def __init__(self, path: Path, clock_origin_ns: int, crs_wkt: str | None = None) -> None:
+        super().__init__(path, clock_origin_ns, crs_wkt)
         self._gps_origin = adjusted_gps_origin(clock_origin_ns)
 
     def _begin(self, first: MapChunk) -> None:
-        self._header = _header(first)
+        self._header = _header(first, self.crs_wkt)
         self._intensity_scale = _intensity_scale(first)
         self._writer = laspy.LasWriter(
             self._temporary.open("wb"),
@@ -60,8 +67,12 @@ class LasWriter(MapWriter):
         if chunk.intensity is not None:
             scaled = np.nan_to_num(chunk.intensity) * self._intensity_scale
             table["intensity"] = np.clip(np.rint(scaled), 0, _MAX_INTENSITY)
-        if chunk.ring is not None and "ring" in table.dtype.names:
-            table["ring"] = chunk.ring
+        for name in _EXTRA:
+            values = getattr(chunk, name)
+            if values is not None and name in table.dtype.names:
+                table[name] = _stored(name, values)
+        if chunk.run_id is not None:
+            table["point_source_id"] = chunk.run_id
         self._writer.write_points(record)
 
     def _steps(self, points: NDArray[np.float64], axis: int) -> NDArray[np.float64]:
@@ -90,19 +101,31 @@ class LazWriter(LasWriter):
     compressed = True
 
 
-def _header(first: MapChunk) -> laspy.LasHeader:
+def _header(first: MapChunk, crs_wkt: str | None) -> laspy.LasHeader:
     header = laspy.LasHeader(point_format=6, version="1.4")
-    middle = np.median(first.points, axis=0) if len(first) else np.zeros(3)
-    header.offsets = np.round(middle / _OFFSET_STEP) * _OFFSET_STEP
+    header.offsets = round_offset(first.points)
     header.scales = np.full(3, SCALE)
     header.global_encoding.gps_time_type = laspy.header.GpsTimeType.STANDARD
     header.global_encoding.wkt = True
     header.generating_software = "bentwing"
     header.system_identifier = "bentwing"
     header.add_extra_dim(laspy.ExtraBytesParams("range", np.float32, "m from the lidar"))
-    if first.ring is not None:
-        header.add_extra_dim(laspy.ExtraBytesParams("ring", np.uint16, "beam number"))
+    for name, (kind, description) in _EXTRA.items():
+        if getattr(first, name) is not None:
+            header.add_extra_dim(laspy.ExtraBytesParams(name, kind, description))
+    if crs_wkt is not None:
+        header.vlrs.append(WktCoordinateSystemVlr(crs_wkt))
     return header
+
+
+def _stored(name: str, values: NDArray[Any]) -> NDArray[Any]:
+    """Values as the file has them: angles in degrees, and no digits that mean nothing.
+
+    Such digits would be most of what a compressed point takes.
+    """
+    if name == "incidence":
+        return np.rint(np.degrees(values) * 8) / 8
+    return np.rint(values * 8192) / 8192 if name == "thickness" else values
 
 
 def _intensity_scale(first: MapChunk) -> float:

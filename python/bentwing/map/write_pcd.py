@@ -1,12 +1,17 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""Binary PCD 0.7 maps, coordinates in single precision as PCL reads them."""
+"""Binary PCD 0.7 maps, coordinates in single precision as PCL reads them.
+
+Geographic coordinates would lose their decimetres, so they are relative to an offset in a comment.
+"""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from bentwing.map.columns import fixed_length_header, row_type, rows
-from bentwing.map.writer import MapWriter
+from bentwing.map.read_rows import PCD_OFFSET
+from bentwing.map.writer import MapWriter, round_offset
 
 if TYPE_CHECKING:
     from bentwing.map.chunk import MapChunk
@@ -17,11 +22,13 @@ class PcdWriter(MapWriter):
 
     def _begin(self, first: MapChunk) -> None:
         self._dtype = row_type(first, "<f4")
+        self._offset = round_offset(first.points)
         self._file = self._temporary.open("wb")
         self._file.write(self._header())
 
     def _append(self, chunk: MapChunk) -> None:
-        self._file.write(rows(chunk, self._dtype).tobytes())
+        near = replace(chunk, points=chunk.points - self._offset)
+        self._file.write(rows(near, self._dtype).tobytes())
 
     def _finish(self) -> None:
         self._file.seek(0)
@@ -35,11 +42,18 @@ class PcdWriter(MapWriter):
         names = self._dtype.names or ()
         types = [self._dtype[name] for name in names]
 
+        crs = []
+        if self._offset.any():
+            crs.append(" ".join([PCD_OFFSET, *(f"{value:.0f}" for value in self._offset)]))
+        if self.crs_wkt:
+            crs.append(f"# crs {self.crs_wkt}")
+
         def build(count: int, filling: str) -> str:
             lines = [
                 "# .PCD v0.7 - Point Cloud Data file format",
                 f"# bentwing map, metres, z up {filling}",
                 f"# time 0 is {self.clock_origin_ns} ns UTC",
+                *crs,
                 "VERSION 0.7",
                 f"FIELDS {' '.join(names)}",
                 f"SIZE {' '.join(str(kind.itemsize) for kind in types)}",

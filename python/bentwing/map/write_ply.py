@@ -37,12 +37,16 @@ class PlyWriter(MapWriter):
         names = self._dtype.names or ()
         properties = [f"property {_TYPES[self._dtype[name].str]} {name}" for name in names]
 
+        # WKT is one line; PLY has no better place for it.
+        crs = [f"comment crs {self.crs_wkt}"] if self.crs_wkt else []
+
         def build(count: int, filling: str) -> str:
             lines = [
                 "ply",
                 "format binary_little_endian 1.0",
                 f"comment bentwing map, metres, z up {filling}",
                 f"comment time 0 is {self.clock_origin_ns} ns UTC",
+                *crs,
                 f"element vertex {count}",
                 *properties,
                 "end_header",

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from pathlib import Path
     from types import TracebackType
 
+    from numpy.typing import NDArray
     from typing_extensions import Self
 
 _WRITERS = {
@@ -27,6 +28,7 @@ _WRITERS = {
     "e57": "write_e57.E57Writer",
 }
 MAP_FORMATS = tuple(_WRITERS)
+_OFFSET_STEP = 1000.0  # m; a local map gets offset 0, a georeferenced one a round number
 
 
 class MapWriter(ABC):
@@ -39,11 +41,13 @@ class MapWriter(ABC):
     ----------
     path : the final name
     clock_origin_ns : absolute time of `times == 0`, ns UTC
+    crs_wkt : the coordinate reference system of the points as WKT 1, None for a frame of their own
     """
 
-    def __init__(self, path: Path, clock_origin_ns: int) -> None:
+    def __init__(self, path: Path, clock_origin_ns: int, crs_wkt: str | None = None) -> None:
         self.path = path
         self.clock_origin_ns = clock_origin_ns
+        self.crs_wkt = crs_wkt
         self.n_points = 0
         self._temporary = temporary_name(path)
         self._open = False
@@ -93,8 +97,10 @@ class MapWriter(ABC):
         """Close the file without caring for its content."""
 
 
-def open_map(path: Path, map_format: str, clock_origin_ns: int) -> MapWriter:
-    """Writer of a map in one of `MAP_FORMATS`.
+def open_map(
+    path: Path, map_format: str, clock_origin_ns: int, crs_wkt: str | None = None
+) -> MapWriter:
+    """Writer of a map in one of `MAP_FORMATS`; the parameters are those of `MapWriter`.
 
     Raises
     ------
@@ -104,7 +110,7 @@ def open_map(path: Path, map_format: str, clock_origin_ns: int) -> MapWriter:
     require_format(map_format)
     module, name = _WRITERS[map_format].split(".")
     writer = getattr(import_module(f"bentwing.map.{module}"), name)
-    return cast("MapWriter", writer(path, clock_origin_ns))
+    return cast("MapWriter", writer(path, clock_origin_ns, crs_wkt))
 
 
 def require_format(map_format: str) -> None:
@@ -114,6 +120,13 @@ def require_format(map_format: str) -> None:
         raise UsageError(msg)
     if map_format == "e57":
         import_module("bentwing.map.write_e57").require_pye57()
+
+
+def round_offset(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return whole kilometres (3,) near the middle of points: 0 for a local map."""
+    middle = np.median(points, axis=0) if len(points) else np.zeros(3)
+    offset: NDArray[np.float64] = np.round(middle / _OFFSET_STEP) * _OFFSET_STEP
+    return offset
 
 
 _EMPTY = MapChunk(np.empty((0, 3)), np.empty(0), np.empty(0, np.float32))

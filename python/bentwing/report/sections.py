@@ -67,7 +67,8 @@ def tiles(record: Mapping[str, Any], trajectory: Trajectory, points: NDArray[np.
         if timings.get("total"):
             facts.append((f"{duration / timings['total']:.1f} {TIMES}", "real time"))
     if "map.points" in counts:
-        facts.append((_amount(counts["map.points"]), "points in the map"))
+        n_points = counts.get("map.written", counts["map.points"])
+        facts.append((_amount(n_points), "points in the map"))
     if len(points):
         size = np.subtract(*np.percentile(thinned(points), [99.8, 0.2], axis=0))
         facts.append((f" {TIMES} ".join(f"{s:.0f}" for s in size) + " m", "extent"))

@@ -121,7 +121,10 @@ def _pairs_of(
     cell = np.cumsum(fresh) - 1
     index = left[order]
     n_cells = int(cell[-1]) + 1 if len(cell) else 0
-    of = [_planes(points[index[halves[index] == h]], cell[halves[index] == h], n_cells) for h in (0, 1)]
+    of = [
+        _planes(points[index[halves[index] == h]], cell[halves[index] == h], n_cells)
+        for h in (0, 1)
+    ]
     probable = [plane_probability(p.values[:, 0], p.n, size, sigma) for p in of]
     good = np.abs(np.einsum("ci,ci->c", of[0].normals, of[1].normals)) > MIN_COSINE
     for planes, probability in zip(of, probable, strict=True):

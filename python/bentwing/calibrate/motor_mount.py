@@ -25,13 +25,13 @@ import numpy as np
 from bentwing import geometry
 from bentwing.calibrate.cells import find_pairs
 from bentwing.errors import DivergedError, RecordingError
+from bentwing.estimators.mount import Pose
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bentwing.calibrate.cells import Pairs
     from bentwing.calibrate.revolution import Revolutions
-    from bentwing.estimators.mount import Pose
 
     Array = NDArray[np.float64]
 
@@ -67,6 +67,8 @@ class MotorCalibration:
     T_motor_lidar : Pose
     across : (2, 3) the two directions across the axis, motor frame
     delay : s, the encoder's angle at a lidar stamp is that of this much earlier
+    correction : (4,) angles, rad, and shifts, m, by which it differs from what was believed
+    turns : (S,) rad, of the sweeps beside their angles
     covariance : (5, 5) of the turns about `across`, rad, the shifts along them, m, and the delay, s
     residual_rms : (2,) m, of the points to the planes of their cells, before and after
     n_pairs, n_points : pairs of planes and points in them
@@ -75,6 +77,8 @@ class MotorCalibration:
     T_motor_lidar: Pose
     across: Array
     delay: float
+    correction: Array
+    turns: Array
     covariance: Array
     residual_rms: Array
     n_pairs: int
@@ -84,6 +88,20 @@ class MotorCalibration:
     def std(self) -> Array:
         """Standard deviations (5,) of angles, offsets and delay."""
         return np.asarray(np.sqrt(np.diag(self.covariance)))
+
+
+@dataclass(frozen=True, slots=True)
+class _Given:
+    """What does not change.
+
+    The axis (3,), the directions across it (2, 3), the lidar's place as it was believed to be, and the
+    information (5 + S,) about the unknowns before any point.
+    """
+
+    axis: Array
+    across: Array
+    believed: Pose
+    prior: Array
 
 
 @dataclass(slots=True)
@@ -117,24 +135,21 @@ def calibrate_motor(
     ----------
     Fu 2023, section 2.2.
     """
-    from bentwing.estimators.mount import Pose
-
     across = np.linalg.svd(axis[None])[2][1:]
     n_sweeps = int(seen.sweeps.max()) + 1
-    R0 = geometry.to_matrices(T_motor_lidar.quat_xyzw)
-    x = _Unknowns(R0, T_motor_lidar.translation.copy(), 0.0, np.zeros(n_sweeps))
-    prior = _prior(seen, n_sweeps)
+    x = _Unknowns(T_motor_lidar.matrix, T_motor_lidar.translation.copy(), 0.0, np.zeros(n_sweeps))
+    given = _Given(axis, across, T_motor_lidar, _prior(seen, n_sweeps))
     before = 0.0
     covariance, pairs, rms = np.zeros((N_SHARED, N_SHARED)), None, 0.0
     for outer in range(N_ROUGH + N_FINE):
         fine = outer >= N_ROUGH
         used = seen if fine else seen.every(THINNED)
-        pairs = find_pairs(place(used, axis, x.R, x.t, x.delay, x.turns), used.halves, sigma)
+        lidar = Pose(x.t, geometry.from_matrices(x.R))
+        pairs = find_pairs(place(used, axis, lidar, x.delay, x.turns), used.halves, sigma)
         _require_room(pairs)
         chosen = _Chosen.of(used, pairs, sigma)
         for _ in range(N_INNER):
-            cauchy = CAUCHY[fine]
-            step, covariance, rms = _solve(chosen, x, axis, across, prior, T_motor_lidar, fine=fine)
+            step, covariance, rms = _solve(chosen, x, given, fine=fine)
             before = before or rms
             _apply(x, step, across)
     quat = geometry.from_matrices(x.R)
@@ -150,6 +165,8 @@ def calibrate_motor(
         Pose(x.t, quat),
         across,
         x.delay,
+        _away(x, across, T_motor_lidar),
+        x.turns,
         covariance,
         np.array([before, rms]),
         len(pairs),
@@ -157,19 +174,10 @@ def calibrate_motor(
     )
 
 
-def place(
-    seen: Revolutions,
-    axis: Array,
-    R: Array,
-    t: Array,
-    delay: float = 0.0,
-    turns: Array | None = None,
-) -> Array:
+def place(seen: Revolutions, axis: Array, lidar: Pose, delay: float, turns: Array) -> Array:
     """Return the points (N, 3) in the frame in which the motor stands, m."""
-    angles = seen.angles - seen.rates * delay
-    if turns is not None:
-        angles = angles + turns[seen.sweeps]
-    return turned(axis, angles, seen.points @ R.T + t)
+    angles = seen.angles - seen.rates * delay + turns[seen.sweeps]
+    return turned(axis, angles, seen.points @ lidar.matrix.T + lidar.translation)
 
 
 def turned(axis: Array, angles: Array, points: Array) -> Array:
@@ -221,14 +229,7 @@ class _Chosen:
 
 
 def _solve(
-    chosen: _Chosen,
-    x: _Unknowns,
-    axis: Array,
-    across: Array,
-    prior: Array,
-    believed: Pose,
-    *,
-    fine: bool,
+    chosen: _Chosen, x: _Unknowns, given: _Given, *, fine: bool
 ) -> tuple[Array, Array, float]:
     """Return a step of all unknowns, the covariance (5, 5) of the shared ones, and the residuals' rms.
 
@@ -236,26 +237,26 @@ def _solve(
     with the gradient g of each, the covariance is `Λ⁻¹ (Σ g gᵀ / κ² + Λ_prior) Λ⁻¹`, κ being the share of
     the weights that is left of them where a residual grows (Huber 1981, section 7.6).
     """
-    rows, weights, kappa, rms = _rows(chosen, x, axis, across, fine=fine)
+    rows, weights, kappa, rms = _rows(chosen, x, given, fine=fine)
     information, gradients = _normal_equations(chosen, rows, weights, len(x.turns))
-    away = np.concatenate([_away(x, across, believed), [x.delay], x.turns])
-    information += np.diag(prior)
+    away = np.concatenate([_away(x, given.across, given.believed), [x.delay], x.turns])
+    information += np.diag(given.prior)
     inverse = np.linalg.inv(information)
-    scatter = gradients.T @ gradients / kappa**2 + np.diag(prior)
+    scatter = gradients.T @ gradients / kappa**2 + np.diag(given.prior)
     covariance = inverse @ scatter @ inverse
-    step = -inverse @ (gradients.sum(axis=0) + prior * away)
+    step = -inverse @ (gradients.sum(axis=0) + given.prior * away)
     return step, covariance[:N_SHARED, :N_SHARED], rms
 
 
 def _rows(
-    chosen: _Chosen, x: _Unknowns, axis: Array, across: Array, *, fine: bool
+    chosen: _Chosen, x: _Unknowns, given: _Given, *, fine: bool
 ) -> tuple[Array, Array, float, float]:
     """Return derivatives and residuals (10, M), weights (M,), κ, and the residuals' weighted rms, m.
 
     The rows: two angles, two offsets, the delay, the sweep's turn, two turns of the plane and its
     height, and the residual.
     """
-    pairs = chosen.pairs
+    pairs, axis, across = chosen.pairs, given.axis, given.across
     turned_points = chosen.points @ x.R.T
     angles = chosen.angles - chosen.rates * x.delay + x.turns[chosen.sweeps]
     arm = turned_points + x.t

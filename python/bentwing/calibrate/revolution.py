@@ -84,8 +84,14 @@ class Revolutions:
     def every(self, step: int) -> Revolutions:
         """Return every so many of the points."""
         one = slice(None, None, step)
-        kept = (v[one] for v in (self.points, self.angles, self.rates, self.halves, self.sweeps))
-        return Revolutions(*kept, self.stretches)
+        return Revolutions(
+            self.points[one],
+            self.angles[one],
+            self.rates[one],
+            self.halves[one],
+            self.sweeps[one],
+            self.stretches,
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +107,7 @@ class Course:
         """Whether the carrier leaves its place."""
         if self.imu is None:
             return False
-        _, rate, force = _blocks(self.imu)
+        _, rate, _ = _blocks(self.imu)
         return bool((np.linalg.norm(rate, axis=1) > 5 * MAX_REST_RATE).sum() * BLOCK > 1.0)
 
 
@@ -116,9 +122,7 @@ def read_course(part: RecordingPart, shown: Stage) -> Course:
             imu.append(batch)
     samples = None
     if imu:
-        columns = (
-            [getattr(b, name) for b in imu] for name in ("times", "gyro", "accel")
-        )
+        columns = ([getattr(b, name) for b in imu] for name in ("times", "gyro", "accel"))
         samples = ImuBatch(*(np.concatenate(column) for column in columns))
     empty = [np.zeros(0)]
     return Course(
@@ -253,7 +257,7 @@ def _whole(course: Course, start: float, n_turns: int, rate: float) -> Stretch:
     begin = float(np.interp(start, course.times, course.angles))
     later = course.times >= start
     turned = abs(course.angles[later] - begin)
-    stop = float(course.times[later][min(int(np.searchsorted(turned, n_turns * TURN)), len(turned) - 1)])
+    stop = float(course.times[later][int(np.argmax(turned >= n_turns * TURN))])
     return Stretch(start, stop, n_turns, rate)
 
 

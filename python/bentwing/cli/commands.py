@@ -13,6 +13,11 @@ from typer.core import TyperCommand, TyperGroup
 COMMANDS = {
     "map": ("map", "map_command", "Turn a recording into a trajectory, a map and a report."),
     "info": ("info", "info", "Tell whether a recording is fit for mapping."),
+    "calibrate": (
+        "calibrate",
+        "calibrate_command",
+        "Calibrate a sensor head: the lidar on its motor, the IMU, the clocks.",
+    ),
     "plan": ("plan", "plan_command", "Plan a flight: how fast to spin, what will be seen."),
     "evaluate": (
         "evaluate",

@@ -24,8 +24,8 @@ COPLANAR, LEVEL = np.cos(np.radians(3.0)), 0.04
 REACH, THICKNESS, DEPTH = 3.0, 0.5, 0.15
 # The cells whose halves come closest together are tried, of those with enough points.
 N_TRIED, MIN_POINTS = 60, 60
-# A wall of more cells is no better to look at.
-MOST_CELLS = 12
+# A wall of more points is no better to look at.
+MOST_POINTS = 5000
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +62,7 @@ def best_wall(before: Array, after: Array, halves: NDArray[np.int64], sigma: flo
     for seed in np.argsort(-gained, kind="stable")[:N_TRIED]:
         wall = _wall_of(pairs, int(seed))
         apart = [float(np.sqrt(np.mean(gap[wall] ** 2))) for gap in gaps]
-        score = (apart[0] - apart[1]) * np.sqrt(min(len(wall), MOST_CELLS))
+        score = (apart[0] - apart[1]) * np.sqrt(min(int(n[wall].sum()), MOST_POINTS))
         if score > best:
             best, chosen = score, wall
     return _section(before, after, halves, pairs, chosen)

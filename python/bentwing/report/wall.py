@@ -23,7 +23,9 @@ WIDTH, HEIGHT, MARGIN, LABEL = 1000, 260, 24, 26
 LENGTH, DEPTH = 6.0, 0.12
 COLOURS = np.array([[130, 170, 205], [235, 160, 140]])  # of the half-scans' points
 MEANS = np.array([[20, 60, 105], [165, 45, 25]])  # and of their means, over so many pixels
-BIN, MIN_IN_BIN = 25, 8
+BIN, MIN_IN_BIN = 40, 5
+# Fewer points are drawn larger: edges in pixels.
+FEW, SMALL, LARGE = 4000, 2, 4
 INK, GRID = (60, 60, 60), (222, 222, 222)
 GRID_STEP = 0.02  # m, across
 SCALE = 3  # pixels of a dot of the letters
@@ -71,8 +73,8 @@ def _panel(along: Array, across: Array, halves: NDArray[np.int64], title: str) -
         image[level, MARGIN : MARGIN + WIDTH] = INK if step == 0 else GRID
     column = MARGIN + (along - low) / max(high - low, 1e-6) * WIDTH
     row = LABEL + (0.5 - across / (2 * DEPTH)) * HEIGHT
-    inside = (column >= MARGIN) & (column < MARGIN + WIDTH - 1)
-    inside &= (row >= LABEL) & (row < LABEL + HEIGHT - 1)
+    inside = (column >= MARGIN) & (column < MARGIN + WIDTH - LARGE)
+    inside &= (row >= LABEL) & (row < LABEL + HEIGHT - LARGE)
     _blend(image, row[inside].astype(np.intp), column[inside].astype(np.intp), halves[inside])
     for half in (0, 1):
         of = inside & (halves == half)
@@ -90,10 +92,11 @@ def _blend(
     """Give every pixel the mean colour of the points in it, the more the darker."""
     shape = image.shape[:2]
     counts = np.zeros((2, *shape))
+    edge = LARGE if len(rows) < FEW else SMALL
     for half in (0, 1):
         of = halves == half
-        for down in (0, 1):
-            np.add.at(counts[half], (rows[of] + down, columns[of]), 1.0)
+        for down, right in np.ndindex(edge, edge):
+            np.add.at(counts[half], (rows[of] + down, columns[of] + right), 1.0)
     total = counts.sum(axis=0)
     seen = total > 0
     mixed = np.einsum("hn,hc->nc", counts[:, seen] / total[seen], COLOURS)

@@ -48,8 +48,10 @@ CAUCHY = (3.0, 2.0)
 DISAGREEMENT, FLATNESS = 3.0, 1e-3
 # Times that the pairs are found anew, and solutions each time; the first of them by every so many of
 # the points.
-N_ROUGH, N_FINE, N_INNER = 3, 2, 2
+N_ROUGH, MAX_FINE, N_INNER = 3, 6, 2
 THINNED = 5
+# Of the angles, in standard deviations: a smaller one is the last.
+LAST_STEP = 0.05
 # Fewer pairs of planes are no room.
 MIN_PAIRS = 30
 # A larger correction is not one of a mount, rad.
@@ -141,22 +143,26 @@ def calibrate_motor(
     given = _Given(axis, across, T_motor_lidar, _prior(seen, n_sweeps))
     before = 0.0
     covariance, pairs, rms = np.zeros((N_SHARED, N_SHARED)), None, 0.0
-    for outer in range(N_ROUGH + N_FINE):
+    for outer in range(N_ROUGH + MAX_FINE):
         fine = outer >= N_ROUGH
         used = seen if fine else seen.every(THINNED)
         lidar = Pose(x.t, geometry.from_matrices(x.R))
         pairs = find_pairs(place(used, axis, lidar, x.delay, x.turns), used.halves, sigma)
         _require_room(pairs)
         chosen = _Chosen.of(used, pairs, sigma)
+        moved = 0.0
         for _ in range(N_INNER):
             step, covariance, rms = _solve(chosen, x, given, fine=fine)
             before = before or rms
+            moved = max(moved, float(np.linalg.norm(step[:2]) / np.sqrt(covariance[0, 0])))
             _apply(x, step, across)
+        if fine and moved < LAST_STEP:
+            break
     quat = geometry.from_matrices(x.R)
-    moved = geometry.log(geometry.multiply(quat, geometry.inverse(T_motor_lidar.quat_xyzw)))
-    if not np.linalg.norm(moved) < MAX_ANGLE:
+    turn = geometry.log(geometry.multiply(quat, geometry.inverse(T_motor_lidar.quat_xyzw)))
+    if not np.linalg.norm(turn) < MAX_ANGLE:
         msg = (
-            f"the half-scans fit best with the lidar turned by {np.degrees(np.linalg.norm(moved)):.0f}° "
+            f"the half-scans fit best with the lidar turned by {np.degrees(np.linalg.norm(turn)):.0f}° "
             "on the motor, which is no error of assembly: check axis and T_motor_lidar of the encoder"
         )
         raise DivergedError(msg)

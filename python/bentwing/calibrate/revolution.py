@@ -172,8 +172,8 @@ def find_stretches(course: Course) -> tuple[Stretch, ...]:
                 found.append(_whole(course, start, n, float(np.median(rates[still]))))
     if not found:
         msg = (
-            "the carrier moves while the motor turns: put it down, let nobody touch it, and record "
-            "one revolution at a constant rate"
+            "the carrier moves before the motor has turned once at a constant rate: put it down, let "
+            "nobody touch it, and record one whole revolution"
         )
         raise RecordingError(msg)
     return tuple(found)

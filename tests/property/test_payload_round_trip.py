@@ -28,12 +28,19 @@ payloads = st.fixed_dictionaries(
         "name": st.text(max_size=20),
         "lidar": st.fixed_dictionaries(
             {"kind": st.sampled_from(["hokuyo-utm30lx", "vlp16", "ouster", "livox", "hesai"])},
-            optional={"topic": topic, "range_sigma": positive},
+            optional={"topic": topic, "range_sigma": positive, "latency": st.floats(-0.1, 0.1)},
         ),
         "imu": st.none() | st.fixed_dictionaries({}, optional={"gyro_noise": positive}),
         "T_imu_lidar": st.none() | transform,
         "self_hits": st.lists(st.fixed_dictionaries({"box": box}), max_size=3),
-        "encoder": st.none() | st.fixed_dictionaries({}, optional={"T_imu_motor": transform}),
+        "encoder": st.none()
+        | st.fixed_dictionaries(
+            {}, optional={"T_imu_motor": transform, "delay": st.floats(-0.1, 0.1)}
+        ),
+        "calibration": st.none()
+        | st.fixed_dictionaries(
+            {"std": st.dictionaries(topic, st.lists(positive, max_size=3), max_size=3)}
+        ),
         "gnss": st.none() | st.fixed_dictionaries({"topic": topic}),
     },
 )

@@ -19,6 +19,11 @@ COMMANDS = {
     ),
     "merge": ("merge", "merge_command", "Put several runs into one map."),
     "info": ("info", "info", "Tell whether a recording is fit for mapping."),
+    "calibrate": (
+        "calibrate",
+        "calibrate_command",
+        "Calibrate a sensor head: the lidar on its motor, the IMU, the clocks.",
+    ),
     "plan": ("plan", "plan_command", "Plan a flight: how fast to spin, what will be seen."),
     "evaluate": (
         "evaluate",

@@ -76,7 +76,7 @@ def begin_pass(
 def _described(situation: Situation, start: Start) -> _core.Globals:
     return core_globals(
         Calibration(
-            latency=0.0,
+            latency=situation.payload.lidar.latency,
             mount=situation.mount,
             gyro_bias=start.gyro_bias,
             accel_bias=start.accel_bias,

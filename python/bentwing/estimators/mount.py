@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bentwing import geometry
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -27,6 +29,11 @@ class Pose:
 
     translation: NDArray[np.float64]
     quat_xyzw: NDArray[np.float64]
+
+    @property
+    def matrix(self) -> NDArray[np.float64]:
+        """(3, 3) the rotation R."""
+        return geometry.to_matrices(self.quat_xyzw)
 
 
 @dataclass(frozen=True, slots=True)

@@ -53,7 +53,8 @@ class Preprocessing:
     def __init__(self, payload: Payload, counts: Counter[str]) -> None:
         self._payload = payload
         self._counts = counts
-        self._encoder = None if payload.encoder is None else EncoderAngles(counts)
+        encoder = payload.encoder
+        self._encoder = None if encoder is None else EncoderAngles(counts, encoder.delay)
 
     def add(self, batch: Batch) -> Iterator[Batch]:
         """Take the next batch; yield what has become usable."""

@@ -28,17 +28,19 @@ class EncoderAngles:
     Parameters
     ----------
     counts : receives `preprocess.no_encoder_angle`, points dropped for lack of an angle
+    delay : s, the angle at a stamp of the lidar is that of this much earlier
     """
 
-    def __init__(self, counts: Counter[str]) -> None:
+    def __init__(self, counts: Counter[str], delay: float = 0.0) -> None:
         self._counts = counts
+        self._delay = delay
         self._times = np.zeros(0)
         self._angles = np.zeros(0)
         self._waiting: deque[LidarBatch] = deque()
 
     def add_encoder(self, batch: EncoderBatch) -> Iterator[LidarBatch]:
         """Take the next angles; yield the batches they complete."""
-        self._times = np.concatenate([self._times, batch.times])
+        self._times = np.concatenate([self._times, batch.times + self._delay])
         self._angles = np.concatenate([self._angles, batch.angles])
         yield from self._release(float(self._times[-1]))
         self._forget()

@@ -34,6 +34,7 @@ Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Vector = tuple[Finite, Finite, Finite]
 Quaternion = tuple[Finite, Finite, Finite, Finite]
+Offset = Annotated[float, Field(ge=-0.5, le=0.5, allow_inf_nan=False)]  # s, between two clocks
 Topic = Annotated[str, Field(min_length=1)]
 
 MAX_LEVER = 10.0  # m; a sensor farther away on the same carrier is a mistake of units
@@ -90,6 +91,8 @@ class Transform(_Section):
 class Lidar(_Section):
     """The lidar; `topic` None means the only topic of a lidar type in the recording.
 
+    latency : s, its stamps minus the IMU's clock, where that is known: where estimators begin
+
     Ranges and `range_sigma` (one standard deviation) are in m and default by `kind`. For raw
     packets: `model` of a Velodyne whose packets do not tell, and the file with the `metadata` of an
     Ouster (JSON; relative to the payload file) where the recording has none.
@@ -102,6 +105,7 @@ class Lidar(_Section):
     min_range: NonNegative = 0.0
     max_range: Positive = 0.0
     range_sigma: Positive = 0.0
+    latency: Offset = 0.0
 
     @model_validator(mode="before")
     @classmethod
@@ -165,13 +169,15 @@ class SelfHit(_Section):
 class Encoder(_Section):
     """The motor that turns the lidar: T_imu_lidar(θ) = T_imu_motor · Rot(axis, θ) · T_motor_lidar.
 
-    `axis` is a unit vector in the motor frame (normalized on entry).
+    `axis` is a unit vector in the motor frame (normalized on entry). `delay`: at a stamp of the lidar
+    the encoder's angle is that of this much earlier, s.
     """
 
     topic: Topic | None = None
     axis: Vector = (0.0, 0.0, 1.0)
     T_imu_motor: Transform = Transform()
     T_motor_lidar: Transform = Transform()
+    delay: Offset = 0.0
 
     @field_validator("axis")
     @classmethod
@@ -192,6 +198,20 @@ class Gnss(_Section):
     topic: Topic
 
 
+class CalibrationRecord(_Section):
+    """How well the values above are known, as `bentwing calibrate` writes it; no estimator reads it.
+
+    `std` are standard deviations by name: `motor_tilt` (rad) and `motor_offset` (m) of the lidar on
+    the motor, about and along the two directions of `motor_across` (motor frame), `encoder_delay`
+    (s), `latency` (s), and of `T_imu_motor` or `T_imu_lidar` `extrinsic_rotation` (rad) and
+    `extrinsic_translation` (m).
+    """
+
+    std: dict[str, tuple[NonNegative, ...]] = Field(default_factory=dict)
+    motor_across: tuple[Vector, Vector] | None = None
+    not_observable: tuple[str, ...] = ()
+
+
 class Payload(_Section):
     """The sensor head.
 
@@ -205,6 +225,7 @@ class Payload(_Section):
     self_hits: tuple[SelfHit, ...] = ()
     encoder: Encoder | None = None
     gnss: Gnss | None = None
+    calibration: CalibrationRecord | None = None
 
     @classmethod
     def default(cls) -> Payload:

@@ -4,5 +4,6 @@
 from bentwing.report.of_evaluation import draw_evaluation
 from bentwing.report.of_run import report_run
 from bentwing.report.page import write_report
+from bentwing.report.wall import draw_wall
 
-__all__ = ["draw_evaluation", "report_run", "write_report"]
+__all__ = ["draw_evaluation", "draw_wall", "report_run", "write_report"]

@@ -22,7 +22,14 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 EventName = Literal[
-    "spin-stall", "gusts", "person", "dropped-packets", "strong-bias", "motion-start", "gap"
+    "spin-stall",
+    "gusts",
+    "person",
+    "dropped-packets",
+    "strong-bias",
+    "motion-start",
+    "gap",
+    "motor-reversal",
 ]
 
 STALL = 4.0
@@ -39,6 +46,11 @@ def turning(times: Array, duration: float, stall: float = STALL) -> Array:
     """Share of the head's drive (N,): zero for `stall` seconds from the middle on, else one."""
     off = 0.55 * duration
     return np.where((times > off) & (times < off + stall), 0.0, 1.0)
+
+
+def reversing(times: Array, duration: float) -> Array:
+    """Direction of a motor (N,) that turns back in the middle, with half a second of change."""
+    return np.asarray(np.clip((0.5 * duration - times) / 0.25, -1.0, 1.0))
 
 
 def gust_shifts(rng: np.random.Generator, times: Array, start: float, end: float) -> Array:

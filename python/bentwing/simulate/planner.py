@@ -51,7 +51,7 @@ def plan_tour(
 
     It fills the site's box, or follows the ground at the given heights.
     """
-    nodes = _free_points(world, rng, clearance, heights)
+    nodes = free_points(world, rng, clearance, heights)
     edges = _connect(world, nodes, clearance)
     home, pad = _choose_pad(world, rng, nodes, edges)
     distances, before = _shortest_paths(nodes, edges, home)
@@ -67,12 +67,13 @@ def plan_tour(
     return Tour(pad, nodes[route])
 
 
-def _free_points(
+def free_points(
     world: World,
     rng: np.random.Generator,
     clearance: float,
-    heights: tuple[float, float] | None,
+    heights: tuple[float, float] | None = None,
 ) -> Array:
+    """Draw places (K, 3) in the site's box that far from every surface, m."""
     low, high = np.array(world.site.low), np.array(world.site.high)
     candidates = rng.uniform(low, high, size=(12 * N_NODES, 3))
     if heights is not None:

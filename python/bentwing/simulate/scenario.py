@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 SceneName = Literal["courtyard", "office", "forest", "cave", "mine", "town", "walls", "dam"]
 HeadName = Literal["hokuyo-spin", "hokuyo-nod", "vlp16-fixed", "vlp16-side", "vlp16-motor"]
 SpinName = Literal["steady", "plant"]
-FlightName = Literal["tour", "survey"]
+FlightName = Literal["tour", "survey", "stand"]
 Format = Literal["bag", "mcap", "db3"]
 _SURVEYED = ("walls", "dam")
 
@@ -50,7 +50,8 @@ class Scenario(BaseModel):
     max_range : m, beyond it the lidar sees nothing; by default what the sensor can do
     events : what goes wrong
     stall : s, how long the head does not turn in the event `spin-stall`
-    flight : a tour from the ground and back, or the site's line in the air (town, walls, dam)
+    flight : a tour from the ground and back, the site's line in the air (town, walls, dam), or none:
+        the head on a stand
     calibrated : whether the payload has the head as it is, and the clocks agree
     noiseless : without random errors of the sensors (calibration and clock stay wrong)
     """
@@ -84,6 +85,9 @@ class Scenario(BaseModel):
 
     @model_validator(mode="after")
     def _can_be_flown(self) -> Scenario:
+        if self.flight == "stand" and self.head == "hokuyo-nod":
+            msg = "hokuyo-nod is carried on foot and stands nowhere: choose another head"
+            raise ValueError(msg)
         if (self.flight == "survey") != (self.scene in _SURVEYED) and self.scene != "town":
             only = "survey" if self.scene in _SURVEYED else "tour"
             msg = f"a {self.scene} has no {self.flight}: choose {only}"

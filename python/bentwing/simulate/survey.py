@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""A flight along a line that begins and ends in the air."""
+"""A flight along a line that begins and ends in the air, and none at all."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bentwing.simulate.planner import free_points
 from bentwing.simulate.splines import Spline, knot_times
 from bentwing.simulate.trajectories import (
     ATTITUDE_STEP,
@@ -21,10 +22,14 @@ from bentwing.simulate.trajectories import (
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from bentwing.simulate.scenes import Survey
+    from bentwing.simulate.scenes import Survey, World
 
 HOVER = 2.0
 """s, before the flight along the line begins."""
+STAND_CLEARANCE = 1.0
+"""m, from a head on a stand to the nearest surface."""
+SLOPE = np.radians(1.0)
+"""Standard deviation of a stand's tilt."""
 FOREVER = 1e6
 
 
@@ -35,7 +40,7 @@ def survey_flight(survey: Survey, rng: np.random.Generator, duration: float) -> 
     """
     points = np.array(survey.way_points)
     if len(points) == 1:
-        return _still(points[0], survey.pitch)
+        return _still(points[0], (0.0, survey.pitch, 0.0))
     way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
     arrival = HOVER + way[-1] / survey.speed
     knots = knot_times(POSITION_STEP, duration)
@@ -46,13 +51,23 @@ def survey_flight(survey: Survey, rng: np.random.Generator, duration: float) -> 
     return with_attitude(rng, Spline(POSITION_STEP, controls + wobble), in_air, duration)
 
 
-def _still(point: NDArray[np.float64], pitch: float) -> Flight:
-    level = Spline(ATTITUDE_STEP, np.zeros((1, 1)))
+def standing(world: World, rng: np.random.Generator) -> Flight:
+    """Stand perfectly still on a stand somewhere in the world, about level."""
+    at = free_points(world, rng, STAND_CLEARANCE)[0]
+    tilt = rng.normal(0.0, SLOPE, 2)
+    return _still(at, (rng.uniform(0.0, 2 * np.pi), tilt[0], tilt[1]))
+
+
+def _still(
+    point: tuple[float, ...] | NDArray[np.float64], turned: tuple[float, float, float]
+) -> Flight:
+    """Stay at a point, turned by yaw, pitch and roll."""
+    yaw, pitch, roll = (np.full((1, 1), angle) for angle in turned)
     at_rest = Phases(FOREVER, FOREVER, FOREVER, FOREVER, FOREVER, FOREVER)
     return Flight(
-        Spline(POSITION_STEP, point[None]),
-        Spline(YAW_STEP, np.zeros((1, 1))),
-        Spline(ATTITUDE_STEP, np.full((1, 1), pitch)),
-        level,
+        Spline(POSITION_STEP, np.array(point)[None]),
+        Spline(YAW_STEP, yaw),
+        Spline(ATTITUDE_STEP, pitch),
+        Spline(ATTITUDE_STEP, roll),
         at_rest,
     )

@@ -79,6 +79,12 @@ def test_points_wait_for_the_encoder_and_get_its_angle():
     assert counts["preprocess.no_encoder_angle"] == 0
 
 
+def test_a_delay_of_the_encoder_is_taken_off():
+    points = lidar([0.05, 0.15, 0.25])
+    batches, _ = run([encoder([0.0, 0.1, 0.2, 0.3]), points], encoder={"delay": 0.01})
+    np.testing.assert_allclose(batches[-1].angles, [0.08, 0.28, 0.48])
+
+
 def test_points_before_and_after_the_encoder_are_dropped_and_counted():
     batches, counts = run([encoder([0.1, 0.2]), lidar([0.05, 0.15, 0.25])], encoder={})
     np.testing.assert_allclose(lidar_times(batches), [0.15])

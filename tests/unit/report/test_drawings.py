@@ -13,6 +13,8 @@ from bentwing.report.picture import encode_png, project, render, render_top, wri
 from bentwing.report.plot import Series, line_plot
 from bentwing.report.svg import nice_ticks
 from bentwing.report.views import overhead_points
+from bentwing.report.wall import HEIGHT as HEIGHT_OF_PANEL
+from bentwing.report.wall import MEANS, draw_wall
 from bentwing.trajectory import Trajectory
 
 
@@ -35,6 +37,23 @@ def test_png_holds_the_picture(tmp_path):
     assert np.array_equal(decoded(encode_png(image)), image)
     write_png(tmp_path / "p.png", image)
     assert (tmp_path / "p.png").read_bytes() == encode_png(image)
+
+
+def test_two_views_of_a_wall_are_drawn_apart_before_and_together_after(tmp_path):
+    along = np.linspace(-2.0, 2.0, 600)
+    halves = np.arange(600) % 2
+    shifted = np.where(halves == 0, 0.03, -0.03)
+    draw_wall(
+        tmp_path / "wall.png", (along, along), (shifted, 0 * along), (halves, halves), (0.06, 0.0)
+    )
+    image = decoded((tmp_path / "wall.png").read_bytes())
+    before, after = np.split(image.astype(int), 2)
+    rows = [np.flatnonzero((before == mean).all(axis=2).any(axis=1)).mean() for mean in MEANS]
+    # 6 cm of the 24 that are shown
+    assert rows[1] - rows[0] == pytest.approx(0.06 / 0.24 * HEIGHT_OF_PANEL, abs=2)
+    # What is drawn last hides what is at the same place.
+    assert not (after == MEANS[0]).all(axis=2).any()
+    assert (after == MEANS[1]).all(axis=2).any(axis=1).sum() == 3
 
 
 def test_the_point_nearest_to_the_viewer_is_seen():

@@ -72,6 +72,25 @@ def test_between_the_walls_the_lidar_stands_still_with_the_motors_axis_towards_o
     assert ranges == pytest.approx([10.0, 10.0], abs=0.1)
 
 
+def test_on_a_stand_the_head_is_still_and_away_from_everything():
+    setup = prepare(Scenario(scene="office", head="vlp16-motor", flight="stand", duration=10.0))
+    motion = setup.rig.imu(np.array([0.0, 5.0, 9.0]))
+    assert np.ptp(motion.p, axis=0) == pytest.approx(np.zeros(3), abs=1e-12)
+    assert np.degrees(np.arccos(motion.R[0, 2, 2])) < 6.0
+    assert setup.world.clearance(motion.p).min() > 0.9
+
+
+def test_a_motor_that_turns_back_turns_as_fast_in_both_directions():
+    scenario = Scenario(
+        scene="office", head="vlp16-motor", flight="stand", motor_rate=3.0, duration=10.0,
+        events=["motor-reversal"],
+    )  # fmt: skip
+    encoder = prepare(scenario).rig.head.encoder
+    assert encoder is not None
+    rates = encoder.angle(np.array([3.0, 4.0, 6.0, 9.0]), 1)[:, 0]
+    assert rates == pytest.approx([3.0, 3.0, -3.0, -3.0], rel=0.05)
+
+
 def test_a_calibrated_head_is_as_its_payload_says():
     setup = prepare(Scenario(scene="dam", calibrated=True, duration=10.0))
     head = setup.rig.head
@@ -87,6 +106,8 @@ def test_a_calibrated_head_is_as_its_payload_says():
         {"scene": "office", "flight": "survey"},
         {"scene": "dam", "flight": "tour"},
         {"scene": "walls", "head": "hokuyo-nod"},
+        {"scene": "walls", "flight": "stand"},
+        {"scene": "office", "head": "hokuyo-nod", "flight": "stand"},
     ],
 )
 def test_what_cannot_be_flown_is_refused(wrong):

@@ -119,7 +119,7 @@ class FilterState:
     encoder_delay: float
 
 
-def first_state(start: Start, mount: Mount) -> FilterState:
+def first_state(start: Start, mount: Mount, latency: float = 0.0) -> FilterState:
     """Return the state at the start as payload and inertial samples have it."""
     base, lidar = _mounts(mount)
     return FilterState(
@@ -130,7 +130,7 @@ def first_state(start: Start, mount: Mount) -> FilterState:
         gravity=[0.0, 0.0, STANDARD_GRAVITY],
         base=_pair(base),
         lidar=_pair(lidar),
-        latency=0.0,
+        latency=latency,
         encoder_delay=0.0,
     )
 

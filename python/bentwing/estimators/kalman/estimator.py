@@ -201,7 +201,8 @@ class Kalman:
             self._angle = self._first_angle(first)
         start = find_start(seen, self._imu)
         mount = self._filter_mount
-        state, covariance = first_state(start, mount), first_covariance(start, mount)
+        state = first_state(start, mount, self._payload.lidar.latency)
+        covariance = first_covariance(start, mount)
         if self._passes:
             state, covariance = self._continued(first, state, covariance)
         self._first, self._begun = first, (state, covariance)

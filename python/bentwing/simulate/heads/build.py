@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing.simulate.events import turning
+from bentwing.simulate.events import reversing, turning
 from bentwing.simulate.heads.airframe import LEG_LENGTH
 from bentwing.simulate.heads.hokuyo_nod import NOD_STEP, hokuyo_nod
 from bentwing.simulate.heads.hokuyo_spin import hokuyo_spin
@@ -16,7 +16,7 @@ from bentwing.simulate.heads.vlp16 import MOTOR_STEP, vlp16_fixed, vlp16_motor, 
 from bentwing.simulate.plant.profile import driven_spin, flight_air
 from bentwing.simulate.rig import Head, Rig
 from bentwing.simulate.splines import knot_times
-from bentwing.simulate.survey import survey_flight
+from bentwing.simulate.survey import standing, survey_flight
 from bentwing.simulate.trajectories import Flight, quadrotor_flight
 from bentwing.simulate.walk import walk
 
@@ -46,11 +46,15 @@ def build_rig(scenario: Scenario, world: World, duration: float) -> Rig:
     if scenario.head == "vlp16-side":
         return Rig(flight, vlp16_side(rng, max_range, exact=exact))
     drive = _drive(scenario, MOTOR_STEP, duration)
+    if "motor-reversal" in scenario.events:
+        drive = drive * reversing(knot_times(MOTOR_STEP, duration), duration)
     return Rig(flight, vlp16_motor(rng, scenario.motor_rate, drive, max_range, exact=exact))
 
 
 def _flight(scenario: Scenario, world: World, duration: float) -> Flight:
     rng, survey = scenario.rng("flight"), world.site.survey
+    if scenario.flight == "stand":
+        return standing(world, rng)
     if scenario.flight == "survey" and survey is not None:
         return survey_flight(survey, rng, duration)
     gusts = "gusts" in scenario.events

@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""`bentwing calibrate`: the transforms and clocks of a sensor head."""
+
+from __future__ import annotations
+
+from pathlib import Path  # noqa: TC003 - typer reads the annotations
+from typing import Annotated
+
+import typer
+
+
+def calibrate_command(  # noqa: PLR0917 - one parameter per option
+    recording: Annotated[list[Path], typer.Argument(help="Recording, or its consecutive parts.")],
+    out: Annotated[Path, typer.Option("-o", "--out", help="Folder to write into.")],
+    payload: Annotated[
+        Path, typer.Option(help="payload.yaml, the description of the sensor head.")
+    ],
+    threads: Annotated[int | None, typer.Option(help="Default: all cores.", min=1)] = None,
+    start: Annotated[
+        float | None, typer.Option(help="Seconds to skip at the start.", min=0)
+    ] = None,
+    duration: Annotated[
+        float | None, typer.Option(help="Seconds of the recording to use.", min=0)
+    ] = None,
+    *,
+    quiet: Annotated[bool, typer.Option("--quiet", help="Say nothing but errors.")] = False,
+) -> None:
+    """Calibrate a sensor head: payload.yaml with standard deviations, and a wall before and after.
+
+    A motor-turned lidar needs one revolution at a constant rate with the carrier at rest in any room;
+    the IMU's mount and the latency are seen in motion.
+    """
+    # slow to import, so only when it is needed
+    from rich.console import Console
+
+    from bentwing.calibrate import CalibrationFolder, calibrate
+    from bentwing.cli.calibration_page import page
+    from bentwing.preprocess import RecordingPart
+    from bentwing.progress import create_progress
+    from bentwing.recording import Payload, Recording
+    from bentwing.report import draw_wall
+
+    head = Payload.load(payload)
+    with Recording(recording, head) as opened:
+        folder = CalibrationFolder(out)
+        part = RecordingPart(opened, head, start, duration)
+        found = calibrate(part, create_progress(quiet=quiet), threads=threads)
+    if (wall := found.wall) is not None:
+        draw_wall(folder.file("wall.png"), wall.along, wall.across, wall.halves, wall.gaps)
+    folder.finish(found, [*recording, payload])
+    if quiet:
+        return
+    console = Console()
+    for part_of_page in page(found):
+        console.print(part_of_page, highlight=False)
+    typer.echo(f"{out}: payload.yaml and calibration.json")

@@ -66,6 +66,7 @@ class RunFolder:
             "warnings": [],
             "calibration": None,
             "loop_closure": None,
+            "georeference": None,
             "map": {},
             "segments": [],
             "windows": [],

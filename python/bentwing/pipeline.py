@@ -5,12 +5,14 @@ from __future__ import annotations
 
 from collections import Counter
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bentwing import estimators
 from bentwing.checkpoint import Checkpoint
-from bentwing.errors import EstimationError
+from bentwing.errors import EstimationError, NotEnoughDataError
+from bentwing.georeference import Georeferenced, GeoreferenceSettings, georeference
 from bentwing.global_registration import Budget, GlobalSettings, close_loops
 from bentwing.localize import Difference, NotInMapError, find_in_map, read_prior_map
 from bentwing.map.chunk import untimed
@@ -36,6 +38,7 @@ if TYPE_CHECKING:
 
     from bentwing.estimators.interface import Estimate, Estimator
     from bentwing.localize import PriorMap
+    from bentwing.map.chunk import MapChunk
     from bentwing.progress import Stage
     from bentwing.recording import Payload
 
@@ -49,6 +52,7 @@ def map_recording(
     map_format: str = "laz",
     map_spacing: float = 0.0,
     cleaning: CleanSettings | None = None,
+    georeferencing: GeoreferenceSettings | None = None,
     loop_closure: bool = True,
     prior_map: Path | str | None = None,
     settings: Any = None,  # noqa: ANN401 - each estimator has its own model
@@ -69,6 +73,8 @@ def map_recording(
     map_format : one of `MAP_FORMATS`
     map_spacing : m, edge of the voxels that keep one point each; 0 keeps all points
     cleaning : what is left out of the map; default: mixed pixels and what moved
+    georeferencing : how GNSS fixes and control points are used; default: fixes, where the payload
+        names their topic, as a rigid fit
     loop_closure : whether places seen again may correct the trajectory
     prior_map : a run folder or a cloud in which the recording is found, and with which it is registered:
         trajectory and map are then in its frame, and what has changed is written too
@@ -92,6 +98,7 @@ def map_recording(
         "map_format": map_format,
         "map_spacing": map_spacing,
         "cleaning": plain(cleaning or CleanSettings()),
+        "georeferencing": plain(georeferencing or GeoreferenceSettings()),
         "loop_closure": plain(GlobalSettings()) if loop_closure or prior_map else False,
         "prior_map": None if prior_map is None else str(prior_map),
         "threads": threads,
@@ -117,8 +124,10 @@ def map_recording(
             if (loop_closure or prior) and done != "loops":
                 _close_loops(run, part, watch, folder, threads=threads, prior=prior)
                 checkpoint.save("loops", run)
+            with folder.stage("georeference"):
+                placed = _georeference(run, part, folder, asked)
             with folder.stage("map"), watch.stage("map", part.length) as shown:
-                _write_map(run, part, shown, folder, asked=asked, prior=prior)
+                _write_map(run, part, shown, folder, asked=asked, prior=prior, placed=placed)
             with folder.stage("report"):
                 folder.save()
                 report_run(folder, run, complete=True)
@@ -210,6 +219,54 @@ def _localize(
     return found.estimate
 
 
+def _georeference(
+    run: Run, part: RecordingPart, folder: RunFolder, asked: dict[str, Any]
+) -> Georeferenced | None:
+    """Put the estimate on the Earth; a map that has no place there is still a map."""
+    if run.estimate is None:
+        return None
+    estimate, gnss = run.estimate, part.payload.gnss
+    with Progress().stage("georeference", part.length) as unseen:
+        try:
+            placed = georeference(
+                estimate.trajectory,
+                part.recording.fixes(part.start, part.duration),
+                GeoreferenceSettings(**asked["georeferencing"]),
+                lever_arm=(0.0, 0.0, 0.0) if gnss is None else gnss.lever_arm,
+                segments=estimate.segments,
+                reach=part.payload.lidar.max_range,
+                chunks=lambda: _projected(estimate, part, unseen, asked, {}),
+            )
+        except NotEnoughDataError as error:
+            folder.record["warnings"].append(f"{error}; the map stays in its own frame")
+            return None
+    if placed is not None:
+        folder.record["georeference"] = placed.record
+        folder.record["warnings"] += placed.warnings
+        if placed.trajectory is not estimate.trajectory:
+            run.estimate = replace(estimate, trajectory=placed.trajectory)
+            origin_ns = part.recording.clock.start_ns
+            folder.write_trajectory("trajectory.txt", run.estimate, origin_ns)
+    return placed
+
+
+def _projected(
+    estimate: Estimate,
+    part: RecordingPart,
+    shown: Stage,
+    asked: dict[str, Any],
+    counts: dict[str, int],
+) -> Iterator[MapChunk]:
+    return project(
+        part.batches(shown, Counter()),  # what is dropped was counted in the first pass
+        estimate.trajectory,
+        estimate.calibration,
+        segments=estimate.segments,
+        threads=asked["threads"],
+        counts=counts,
+    )
+
+
 def _write_map(
     run: Run,
     part: RecordingPart,
@@ -218,19 +275,12 @@ def _write_map(
     *,
     asked: dict[str, Any],
     prior: PriorMap | None,
+    placed: Georeferenced | None,
 ) -> None:
     if run.estimate is None:
         return
     counts, map_format = folder.record["counts"], asked["map_format"]
-    chunks = project(
-        part.batches(shown, Counter()),  # what is dropped was counted in the first pass
-        run.estimate.trajectory,
-        run.estimate.calibration,
-        segments=run.estimate.segments,
-        threads=asked["threads"],
-        counts=counts,
-    )
-    origin_ns = part.recording.clock.start_ns
+    chunks = _projected(run.estimate, part, shown, asked, counts)
     path = folder.file(f"map.{map_format}")
     chunks = clean(
         chunks,
@@ -246,8 +296,12 @@ def _write_map(
         difference = Difference(prior.cloud, run.estimate.trajectory)
         chunks = difference.watch(chunks)
     chunks = thin(chunks, asked["map_spacing"], counts)
-    with open_map(path, map_format, origin_ns) as writer:
+    origin_ns = part.recording.clock.start_ns
+    crs_wkt = None if placed is None else placed.crs_wkt
+    with open_map(path, map_format, origin_ns, crs_wkt) as writer:
         for chunk in run.sample.watch(chunks):
+            if placed is not None:
+                chunk = replace(chunk, points=placed.to_projected(chunk.points))
             writer.write(chunk)
     counts["map.written"] = writer.n_points
     if difference is not None:

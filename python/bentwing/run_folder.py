@@ -69,6 +69,7 @@ class RunFolder:
             "calibration": None,
             "localization": None,
             "loop_closure": None,
+            "georeference": None,
             "map": {},
             "segments": [],
             "windows": [],

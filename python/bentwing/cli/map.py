@@ -4,9 +4,12 @@
 from __future__ import annotations
 
 from pathlib import Path  # noqa: TC003 - typer reads the annotations
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+
+if TYPE_CHECKING:
+    from bentwing.georeference import GeoreferenceSettings
 
 
 def map_command(
@@ -37,6 +40,19 @@ def map_command(
     keep_mixed: Annotated[
         bool, typer.Option("--keep-mixed", help="Keep returns between two surfaces.")
     ] = False,
+    georeference: Annotated[
+        str,
+        typer.Option(
+            help="Use of GNSS fixes and control points: rigid, constraints (may bend the map) or off."
+        ),
+    ] = "rigid",
+    epsg: Annotated[
+        int | None,
+        typer.Option(help="Projected system of the map.", show_default="UTM zone", min=1),
+    ] = None,
+    control_points: Annotated[
+        Path | None, typer.Option(help="CSV of surveyed points: id,x,y,z,radius[,use].")
+    ] = None,
     no_loop_closure: Annotated[
         bool, typer.Option("--no-loop-closure", help="Leave the trajectory open-loop.")
     ] = False,
@@ -77,6 +93,7 @@ def map_command(
         "map_format": map_format,
         "map_spacing": map_spacing,
         "cleaning": CleanSettings(mixed_pixels=not keep_mixed, moving=not keep_moving),
+        "georeferencing": georeferencing_settings(georeference, epsg, control_points),
         "loop_closure": not no_loop_closure,
         "threads": threads,
         "start": start,
@@ -93,3 +110,24 @@ def map_command(
     map_recording(recording, payload, out, **options)
     if not quiet:
         typer.echo(f"{out}: open {out / 'report.html'}")
+
+
+def georeferencing_settings(
+    mode: str, epsg: int | None, control_points: Path | None
+) -> GeoreferenceSettings:
+    """Return the settings that the options stand for.
+
+    Raises
+    ------
+    UsageError
+        If the mode is none of the known ones.
+    """
+    from bentwing.errors import UsageError
+    from bentwing.georeference.settings import GeoreferenceSettings
+
+    if mode not in {"rigid", "constraints", "off"}:
+        msg = f"--georeference {mode!r} is not known; choose rigid, constraints or off"
+        raise UsageError(msg)
+    return GeoreferenceSettings.model_validate(
+        {"mode": mode, "epsg": epsg, "control_points": control_points}
+    )

@@ -53,6 +53,9 @@ def simulate_command(  # noqa: PLR0917 - one parameter per option
         str | None,
         Option(help=f"One of {_names(FlightName)}.", show_default="survey where there is no tour"),
     ] = None,
+    gnss: Annotated[
+        str | None, Option(help="A receiver: rtk or single.", show_default="none")
+    ] = None,
     event: Annotated[
         list[str] | None, Option(help=f"Repeatable: {_names(EventName)}.", show_default=False)
     ] = None,
@@ -76,6 +79,7 @@ def simulate_command(  # noqa: PLR0917 - one parameter per option
         "events": event or (),
         "stall": stall,
         "flight": flight,
+        "gnss": gnss,
         "calibrated": calibrated,
     }
     _run(_scenario(choices), out)

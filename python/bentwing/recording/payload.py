@@ -45,6 +45,15 @@ class _Section(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
+def require_lever(value: Vector) -> Vector:
+    """Refuse an offset between sensors that no carrier has."""
+    distance = float(np.linalg.norm(value))
+    if distance > MAX_LEVER:
+        msg = f"is {distance:.4g} m long, more than {MAX_LEVER:g} m: give it in metres"
+        raise ValueError(msg)
+    return value
+
+
 class Transform(_Section):
     """Rigid transform, `translation` in m and `quaternion` x y z w (normalized on entry)."""
 
@@ -54,11 +63,7 @@ class Transform(_Section):
     @field_validator("translation")
     @classmethod
     def _plausible_lever(cls, value: Vector) -> Vector:
-        distance = float(np.linalg.norm(value))
-        if distance > MAX_LEVER:
-            msg = f"is {distance:.4g} m long, more than {MAX_LEVER:g} m: give it in metres"
-            raise ValueError(msg)
-        return value
+        return require_lever(value)
 
     @field_validator("quaternion")
     @classmethod
@@ -193,9 +198,18 @@ class Encoder(_Section):
 
 
 class Gnss(_Section):
-    """GNSS fixes (NavSatFix), used only when named."""
+    """GNSS fixes (NavSatFix), used only when named.
+
+    `lever_arm` is the antenna's phase centre in the IMU frame, m.
+    """
 
     topic: Topic
+    lever_arm: Vector = (0.0, 0.0, 0.0)
+
+    @field_validator("lever_arm")
+    @classmethod
+    def _plausible_lever(cls, value: Vector) -> Vector:
+        return require_lever(value)
 
 
 class CalibrationRecord(_Section):

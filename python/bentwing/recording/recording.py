@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from bentwing.clock import NS_PER_S, Clock
 from bentwing.errors import PayloadError, RecordingError
 from bentwing.recording import imu_units, problems
+from bentwing.recording.fixes import Fixes, read_fixes
 from bentwing.recording.open_streams import open_streams
 from bentwing.recording.packet_peek import peek_imu, peek_lidar
 from bentwing.recording.payload import Payload
@@ -17,7 +18,7 @@ from bentwing.recording.peek import Peek, peek
 from bentwing.recording.slots import group_into_slots, trimmed
 from bentwing.recording.source import open_source
 from bentwing.recording.stream_warnings import stream_warnings
-from bentwing.recording.topics import PACKET_TYPES, resolve
+from bentwing.recording.topics import NAV_SAT_FIX, PACKET_TYPES, resolve
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -213,7 +214,7 @@ class Recording:
                 "clock, or expect the stamps' jitter"
             )
         gnss = self.payload.gnss
-        if gnss is not None and gnss.topic not in {topic.name for topic in self.topics}:
+        if gnss is not None and self._gnss_topic() is None:
             sentences.append(
                 f"the payload names the gnss topic {gnss.topic}, which the recording does not have; "
                 "the map stays in its own frame"
@@ -254,6 +255,39 @@ class Recording:
                 yield part
         if self.strict and n_points == 0:
             self._refuse_empty(begin, end)
+
+    def fixes(self, start: float | None = None, duration: float | None = None) -> Fixes | None:
+        """Read the GNSS fixes; None where the payload names no topic or the recording has it not.
+
+        Parameters
+        ----------
+        start, duration : s, part of the recording to read, relative to its start
+
+        Raises
+        ------
+        RecordingError
+            The topic has another type.
+        """
+        topic = self._gnss_topic()
+        if topic is None:
+            return None
+        if topic.type != NAV_SAT_FIX:
+            msg = (
+                f"topic {topic.name} has the type {topic.type or 'unknown'}, which cannot be read as "
+                f"gnss; supported is {NAV_SAT_FIX}"
+            )
+            raise RecordingError(msg)
+        begin = 0.0 if start is None else start
+        end = float("inf") if duration is None else begin + duration
+        messages = self._source.messages({topic.name}, self._seek_ns(begin))
+        return read_fixes(messages, self.clock, cdr=self._source.cdr, begin=begin, end=end)
+
+    def _gnss_topic(self) -> TopicInfo | None:
+        gnss = self.payload.gnss
+        if gnss is None:
+            return None
+        name = gnss.topic.strip("/")
+        return next((topic for topic in self.topics if topic.name.strip("/") == name), None)
 
     def _seek_ns(self, begin: float) -> int | None:
         if begin <= SEEK_MARGIN:

@@ -38,6 +38,7 @@ LIDAR_TYPES = (
     (*VELODYNE_TYPES, *OUSTER_PACKETS, UDP_OUSTER_LIDAR),
 )
 IMU_TYPES = ((IMU,), (*OUSTER_PACKETS, UDP_OUSTER_IMU))
+NAV_SAT_FIX = "sensor_msgs/msg/NavSatFix"
 JOINT_STATE = "sensor_msgs/msg/JointState"
 ENCODER_TYPES = ((JOINT_STATE,),)
 

@@ -90,4 +90,16 @@ class EncoderRecord:
     angle: float
 
 
-Record = ScanRecord | CloudRecord | ImuRecord | EncoderRecord
+@dataclass(frozen=True, slots=True)
+class FixRecord:
+    """A position of the GNSS antenna: deg, m above the ellipsoid; covariance (9,) m², ENU."""
+
+    stamp: float
+    arrival: float
+    longitude: float
+    latitude: float
+    height: float
+    covariance: NDArray[np.float64]
+
+
+Record = ScanRecord | CloudRecord | ImuRecord | EncoderRecord | FixRecord

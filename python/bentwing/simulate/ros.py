@@ -16,6 +16,7 @@ from bentwing.simulate.records import (
     POINT_FIELDS,
     CloudRecord,
     EncoderRecord,
+    FixRecord,
     ImuRecord,
     Record,
     ScanRecord,
@@ -100,6 +101,8 @@ class BagWriter:
                 return self._imu(record, header)
             case EncoderRecord():
                 return self._encoder(record, header)
+            case FixRecord():
+                return self._fix(record, header)
 
     def _scan(self, record: ScanRecord, header: Message) -> Message:
         span = record.angle_increment * (len(record.ranges) - 1)
@@ -145,6 +148,18 @@ class BagWriter:
             angular_velocity_covariance=unknown,
             linear_acceleration=vector(*record.accel),
             linear_acceleration_covariance=unknown,
+        )
+
+    def _fix(self, record: FixRecord, header: Message) -> Message:
+        status = self._type("sensor_msgs/msg/NavSatStatus")(status=0, service=1)
+        return self._type("sensor_msgs/msg/NavSatFix")(
+            header=header,
+            status=status,
+            latitude=record.latitude,
+            longitude=record.longitude,
+            altitude=record.height,
+            position_covariance=record.covariance,
+            position_covariance_type=2,
         )
 
     def _encoder(self, record: EncoderRecord, header: Message) -> Message:

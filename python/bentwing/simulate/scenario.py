@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from bentwing.simulate.events import GAP, LEAD, STALL, EventName, Losses, Person, strong_bias
+from bentwing.simulate.gnss import Receiver, ReceiverName
 from bentwing.simulate.heads.build import build_rig
 from bentwing.simulate.imu import PERFECT, Imu, ImuErrors
 from bentwing.simulate.lidars.interface import LidarClock
@@ -50,6 +51,7 @@ class Scenario(BaseModel):
     max_range : m, beyond it the lidar sees nothing; by default what the sensor can do
     events : what goes wrong
     stall : s, how long the head does not turn in the event `spin-stall`
+    gnss : a receiver, `rtk` or `single`; by default there is none
     flight : a tour from the ground and back, the site's line in the air (town, walls, dam), or none:
         the head on a stand
     calibrated : whether the payload has the head as it is, and the clocks agree
@@ -69,6 +71,7 @@ class Scenario(BaseModel):
     max_range: float | None = Field(default=None, gt=1.0)
     events: tuple[EventName, ...] = ()
     stall: float = Field(default=STALL, gt=0.0, le=60.0)
+    gnss: ReceiverName | None = None
     flight: FlightName = "tour"
     calibrated: bool = False
     noiseless: bool = False
@@ -152,7 +155,10 @@ def prepare(scenario: Scenario) -> Setup:
         _movers(scenario, world, rig, 0.5 * (first + last)),
         rng,
     )
-    sensors = Sensors(rig, ranger, imu, clock, _losses(scenario, first, last), rng)
+    receiver = None
+    if scenario.gnss is not None:
+        receiver = Receiver(scenario.gnss, scenario.rng("gnss"), rig.imu, scenario.noiseless)
+    sensors = Sensors(rig, ranger, imu, clock, _losses(scenario, first, last), rng, receiver)
     return Setup(world, rig, sensors, first, last)
 
 

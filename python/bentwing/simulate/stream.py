@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bentwing.simulate.gnss import RATE_HZ as FIX_RATE_HZ
 from bentwing.simulate.imu import RATE_HZ, Imu
 from bentwing.simulate.records import EncoderRecord, ImuRecord, Record
 
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bentwing.simulate.events import Losses
+    from bentwing.simulate.gnss import Receiver
     from bentwing.simulate.lidars.interface import LidarClock
     from bentwing.simulate.ranging import Ranger
     from bentwing.simulate.rig import Encoder, Rig
@@ -38,6 +40,7 @@ class Sensors:
     clock: LidarClock
     losses: Losses
     rng: np.random.Generator
+    receiver: Receiver | None = None
 
     def stream(self, first: float, last: float) -> Iterator[tuple[float, float, list[Record]]]:
         """Measure from `first` to `last`, about a second at a time.
@@ -58,7 +61,10 @@ class Sensors:
     def _measure(self, start: float, end: float) -> list[Record]:
         records = self._inertial(start, end) + self._lidar(start, end)
         encoder = self.rig.head.encoder
-        return records + (self._encoder(encoder, start, end) if encoder else [])
+        records += self._encoder(encoder, start, end) if encoder else []
+        if self.receiver is not None:
+            records += self.receiver.fixes(ticks(start, end, FIX_RATE_HZ))
+        return records
 
     def _inertial(self, start: float, end: float) -> list[Record]:
         times = ticks(start, end, RATE_HZ)

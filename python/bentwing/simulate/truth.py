@@ -9,6 +9,7 @@ import numpy as np
 import yaml
 
 from bentwing.clock import format_ns
+from bentwing.simulate.gnss import LEVER_ARM
 from bentwing.simulate.imu import ImuErrors
 from bentwing.simulate.kinematics import quats_xyzw
 from bentwing.simulate.ros import to_ns
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-IMU_TOPIC, ENCODER_TOPIC = "/imu", "/encoder"
+IMU_TOPIC, ENCODER_TOPIC, FIX_TOPIC = "/imu", "/encoder", "/fix"
 
 
 def write_yaml(path: Path, content: dict[str, Any]) -> None:
@@ -68,7 +69,10 @@ def payload(setup: Setup, scenario: Scenario) -> dict[str, Any]:
         "accel_bias_walk": errors.accel_bias_walk,
     }
     head = dict(setup.rig.head.payload)
-    return {"name": f"simulated-{scenario.head}", "lidar": head.pop("lidar"), "imu": imu, **head}
+    described = {"name": f"simulated-{scenario.head}", "lidar": head.pop("lidar"), "imu": imu}
+    if setup.sensors.receiver is not None:
+        head["gnss"] = {"topic": FIX_TOPIC, "lever_arm": list(LEVER_ARM)}
+    return {**described, **head}
 
 
 def calibration(setup: Setup, first_biases: Array, last_biases: Array) -> dict[str, Any]:

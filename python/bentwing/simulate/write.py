@@ -8,11 +8,19 @@ from typing import TYPE_CHECKING
 
 from bentwing.errors import UsageError
 from bentwing.simulate.imu import RATE_HZ
-from bentwing.simulate.records import CloudRecord, EncoderRecord, ImuRecord, Record, ScanRecord
+from bentwing.simulate.records import (
+    CloudRecord,
+    EncoderRecord,
+    FixRecord,
+    ImuRecord,
+    Record,
+    ScanRecord,
+)
 from bentwing.simulate.ros import BagWriter
 from bentwing.simulate.stream import ticks
 from bentwing.simulate.truth import (
     ENCODER_TOPIC,
+    FIX_TOPIC,
     IMU_TOPIC,
     calibration,
     payload,
@@ -59,6 +67,8 @@ def write_recording(
     write_yaml(files.scenario, scenario.model_dump(mode="json"))
     write_yaml(files.payload, payload(setup, scenario))
     write_ply(files.scene, setup.world.site.mesh)
+    if setup.sensors.receiver is not None:
+        write_yaml(out / "truth_georeference.yaml", setup.sensors.receiver.truth())
     biases = [setup.sensors.imu.biases.copy()]
     with BagWriter(files.recording, scenario.format) as bag, files.trajectory.open("w") as truth:
         for start, end, records in setup.sensors.stream(setup.first, setup.last):
@@ -95,5 +105,7 @@ def _topic_and_frame(record: Record, rig: Rig) -> tuple[str, str]:
             return IMU_TOPIC, "imu"
         case EncoderRecord():
             return ENCODER_TOPIC, "motor"
+        case FixRecord():
+            return FIX_TOPIC, "gnss"
         case ScanRecord() | CloudRecord():
             return rig.head.lidar.topic, "lidar"

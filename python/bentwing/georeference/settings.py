@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""How a map is put on the Earth."""
+
+from __future__ import annotations
+
+from pathlib import Path  # noqa: TC003 - pydantic reads the annotations
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Mode = Literal["rigid", "constraints", "off"]
+
+
+class GeoreferenceSettings(BaseModel):
+    """How GNSS fixes and control points are used.
+
+    Attributes
+    ----------
+    mode : `rigid` turns the map about the vertical and shifts it, and leaves its shape alone;
+        `constraints` also bends the trajectory towards the fixes and control points, as far as it
+        may have drifted: choose it for long flights with good fixes; `off` ignores them
+    epsg : projected system of the map; default: the UTM zone of the fixes
+    control_points : CSV file of surveyed points, see `read_control_points`
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    mode: Mode = "rigid"
+    epsg: int | None = Field(default=None, gt=0)
+    control_points: Path | None = None

@@ -24,7 +24,9 @@ if TYPE_CHECKING:
 
     from bentwing.simulate.rig import Rig
 
-SceneName = Literal["courtyard", "office", "forest", "cave", "mine", "town", "walls", "dam"]
+SceneName = Literal[
+    "courtyard", "office", "forest", "cave", "mine", "town", "walls", "dam", "mocap", "carpark", "campus"
+]  # fmt: skip
 HeadName = Literal["hokuyo-spin", "hokuyo-nod", "vlp16-fixed", "vlp16-side", "vlp16-motor"]
 SpinName = Literal["steady", "plant"]
 FlightName = Literal["tour", "survey"]

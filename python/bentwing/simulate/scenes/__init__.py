@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from bentwing.simulate.scenes.campus import campus
 from bentwing.simulate.scenes.carpark import carpark
 from bentwing.simulate.scenes.cave import cave
+from bentwing.simulate.scenes.compound import compound
 from bentwing.simulate.scenes.courtyard import courtyard
 from bentwing.simulate.scenes.dam import dam
 from bentwing.simulate.scenes.forest import forest
@@ -27,6 +28,7 @@ __all__ = ["SCENES", "Site", "Survey", "World"]
 
 SCENES: dict[str, Callable[[np.random.Generator], Site]] = {
     "courtyard": courtyard,
+    "compound": compound,
     "office": office,
     "forest": forest,
     "cave": cave,

@@ -12,7 +12,7 @@ Option = typer.Option
 
 
 def reproduce_command(
-    paper: Annotated[str, typer.Argument(help="kaul2015.")],
+    paper: Annotated[str, typer.Argument(help="kaul2015, fu2023 or tazir2020.")],
     out: Annotated[
         Path | None, Option("-o", "--out", help="Folder to write into.", show_default="PAPER")
     ] = None,
@@ -25,7 +25,7 @@ def reproduce_command(
     quick: Annotated[bool, Option("--quick", help="Less of everything, in minutes.")] = False,
     quiet: Annotated[bool, Option("--quiet", help="Say nothing but errors.")] = False,
 ) -> None:
-    """Make a paper's tables and figures again: report.html, figures as SVG, numbers as JSON."""
+    """Make a paper's tables and figures again: report.html, figures as PNG and SVG, numbers as JSON."""
     # slow to import, so only when it is needed
     from rich.console import Console
     from rich.table import Table
@@ -41,6 +41,13 @@ def reproduce_command(
         return
     console = Console()
     for made in written.parts:
+        for shown in made.tables:
+            table = Table(title=shown.title, title_justify="left", box=None, caption=shown.note)
+            for heading in shown.head:
+                table.add_column(heading)
+            for cells in shown.rows:
+                table.add_row(*cells)
+            console.print(table)
         if made.compared:
             table = Table(title=made.title, title_justify="left", box=None)
             for heading in ("", "paper", "bentwing", "aim", ""):

@@ -60,6 +60,23 @@ class Compared:
 
 
 @dataclass(frozen=True, slots=True)
+class TextTable:
+    """A table of the paper with ours beside it: title, names of the columns, rows, and a remark."""
+
+    title: str
+    head: tuple[str, ...]
+    rows: list[tuple[str, ...]]
+    note: str = ""
+
+    def markdown(self) -> str:
+        """Return the table as Markdown."""
+        lines = [f"| {' | '.join(row)} |" for row in (self.head, *self.rows)]
+        lines.insert(1, f"|{'---|' * len(self.head)}")
+        note = [self.note, ""] if self.note else []
+        return "\n".join([f"**{self.title}**", "", *lines, "", *note])
+
+
+@dataclass(frozen=True, slots=True)
 class Part:
     """Figures on one page, the comparison with the paper, and the numbers behind them."""
 
@@ -67,3 +84,4 @@ class Part:
     figures: list[Figure]
     numbers: dict[str, Any] = field(default_factory=dict)
     compared: list[Compared] = field(default_factory=list)
+    tables: list[TextTable] = field(default_factory=list)

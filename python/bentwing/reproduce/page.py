@@ -12,7 +12,7 @@ from bentwing.report.sections import DASH, table
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from bentwing.reproduce.figure import Compared, Part
+    from bentwing.reproduce.figure import Compared, Part, TextTable
 
 MET = {True: "met", False: "missed", None: ""}
 
@@ -35,8 +35,14 @@ def _section(part: Part) -> str:
         f"<figure>{f.drawing}<figcaption><b>{escape(f.title)}</b> {escape(f.note)}</figcaption></figure>"
         for f in part.figures
     )
+    tables = "".join(map(_table, part.tables))
     compared = _compared(part.compared) if part.compared else ""
-    return f'<h2>{escape(part.title)}</h2>{compared}<div class="grid">{figures}</div>'
+    return f'<h2>{escape(part.title)}</h2>{tables}{compared}<div class="grid">{figures}</div>'
+
+
+def _table(shown: TextTable) -> str:
+    note = f"<p>{escape(shown.note)}</p>" if shown.note else ""
+    return f"<h3>{escape(shown.title)}</h3>{table(shown.head, shown.rows)}{note}"
 
 
 def _compared(rows: Sequence[Compared]) -> str:

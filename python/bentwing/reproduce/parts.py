@@ -7,14 +7,17 @@ import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from bentwing.atomic import write_text
+from bentwing.atomic import write_bytes, write_text
 from bentwing.errors import UsageError
 from bentwing.progress import Progress
+from bentwing.report.raster import rasterize
 from bentwing.report.svg import standalone
 from bentwing.reproduce.figure import Assignment
 from bentwing.reproduce.flight import flight_part
+from bentwing.reproduce.fu2023 import fu_part
 from bentwing.reproduce.mapping import mapping_part
 from bentwing.reproduce.page import page
+from bentwing.reproduce.tazir2020 import tazir_part
 from bentwing.run_record import bentwing_version, plain
 
 if TYPE_CHECKING:
@@ -25,6 +28,8 @@ if TYPE_CHECKING:
 
 PARTS: dict[str, dict[str, Callable[[Assignment], Part]]] = {
     "kaul2015": {"mapping": mapping_part, "flight": flight_part},
+    "fu2023": {"mapping": fu_part},
+    "tazir2020": {"mapping": tazir_part},
 }
 
 
@@ -46,7 +51,7 @@ def reproduce(
     seed: int = 1,
     progress: Progress | None = None,
 ) -> Reproduced:
-    """Write report.html and the figures of a paper's parts (all by default) into the folder `out`.
+    """Write report.html, the figures and the tables of a paper's parts (default: all) into `out`.
 
     Raises
     ------
@@ -75,6 +80,9 @@ def _write(out: Path, name: str, part: Part, written: Reproduced) -> None:
     for figure in part.figures:
         path = out / f"{figure.name}.svg"
         write_text(path, standalone(figure.drawing))
+        write_bytes(path.with_suffix(".png"), rasterize(figure.drawing))
         written.figures.append(path)
+    if part.tables:
+        write_text(out / f"{name}.md", "\n".join(table.markdown() for table in part.tables))
     write_text(out / f"{name}.json", json.dumps(plain(part.numbers), indent=1) + "\n")
     written.parts.append(part)

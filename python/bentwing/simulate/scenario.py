@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from bentwing.simulate.rig import Rig
 
 SceneName = Literal[
-SceneName = Literal[
     "courtyard", "compound", "office", "forest", "cave", "mine", "town", "walls", "dam",
     "mocap", "carpark", "campus",
 ]  # fmt: skip

@@ -42,12 +42,7 @@ def reproduce_command(
     console = Console()
     for made in written.parts:
         for shown in made.tables:
-            table = Table(title=shown.title, title_justify="left", box=None, caption=shown.note)
-            for heading in shown.head:
-                table.add_column(heading)
-            for cells in shown.rows:
-                table.add_row(*cells)
-            console.print(table)
+            typer.echo(shown.markdown())
         if made.compared:
             table = Table(title=made.title, title_justify="left", box=None)
             for heading in ("", "paper", "bentwing", "aim", ""):

@@ -13,10 +13,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bentwing import geometry
 from bentwing.errors import InputError
+from bentwing.evaluate.alignment import associate
 from bentwing.evaluate.trajectory import absolute_error
 from bentwing.reproduce.trials import attempt, motor_stopped, points_of, true_calibration
 from bentwing.simulate.scenario import Scenario, simulate
+from bentwing.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -26,7 +29,6 @@ if TYPE_CHECKING:
 
     from bentwing.reproduce.figure import Assignment
     from bentwing.reproduce.trials import Attempt, Flight
-    from bentwing.trajectory import Trajectory
 
     Array = NDArray[np.float64]
 
@@ -45,6 +47,7 @@ class Result:
     ----------
     trajectory : as estimated; None if the estimator gave up
     aligned : moved onto the truth as a whole
+    from_start : moved so that the first poses agree
     distances : (N,) m, from the truth at its stamps `distance_times`
     points : (P, 3) float32, m, some of the returns in the map by `aligned`
     why : the estimator gave up
@@ -54,6 +57,7 @@ class Result:
 
     trajectory: Trajectory | None
     aligned: Trajectory | None
+    from_start: Trajectory | None
     distance_times: Array
     distances: Array
     points: NDArray[np.float32]
@@ -219,11 +223,19 @@ def fly(
     return Flown(flight, truth, true_points, unturned, results)
 
 
+def with_first_pose(estimate: Trajectory, truth: Trajectory) -> Trajectory:
+    """Move an estimate so that its first pose with a truth is the true one."""
+    found, true = associate(estimate, truth)
+    turn = geometry.multiply(true.quats_xyzw[0], geometry.inverse(found.quats_xyzw[0]))
+    placed = geometry.rotate(turn, estimate.positions - found.positions[0]) + true.positions[0]
+    return Trajectory(estimate.times, placed, geometry.multiply(turn, estimate.quats_xyzw))
+
+
 def _result(tried: Attempt) -> Result:
     """Place what was found on the truth."""
     times, distances = np.zeros(0), np.zeros(0)
     points = _NO_POINTS
-    trajectory = aligned = None
+    trajectory = aligned = from_start = None
     windows: list[dict[str, Any]] = []
     why = tried.why
     if tried.estimate is not None:
@@ -234,10 +246,12 @@ def _result(tried: Attempt) -> Result:
             why = str(problem)
         else:
             aligned = error.alignment.apply(trajectory)
+            from_start = with_first_pose(trajectory, tried.truth)
             times, distances = error.times, error.distances
             found = points_of(tried.lidar, aligned, tried.estimate.calibration)
             points = found.astype(np.float32)
     return Result(
-        trajectory, aligned, times, distances, points, why, windows,
+        trajectory, aligned,
+        from_start, times, distances, points, why, windows,
         tried.length, tried.seconds, tried.cpu,
     )  # fmt: skip

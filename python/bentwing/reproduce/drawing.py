@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 
 _STEP = 10  # of 100 Hz poses, in a drawing
 _OFF = 0.75  # of the extent of the way: farther outside nothing is drawn
-_WIDE = 1140  # pixels of a drawing that takes the width of the page
 
 
 def positions_over(
@@ -51,7 +50,7 @@ def positions_over(
                 y[there] = trajectory.interpolate(truth.times[there])[0][:, axis]
                 y[(y < values.min() - spare) | (y > values.max() + spare)] = np.nan
                 lines.append(Series(label, x[::_STEP], y[::_STEP]))
-        drawings.append(line_plot(lines, x_label, f"{name}, m", width=_WIDE, height=200))
+        drawings.append(line_plot(lines, x_label, f"{name}, m"))
     return drawings
 
 
@@ -74,7 +73,7 @@ def angles_over(
                 y[there] = values[there] + (off + 180.0) % 360.0 - 180.0
                 y[(y < values.min() - spare) | (y > values.max() + spare)] = np.nan
                 lines.append(Series(label, x[::_STEP], y[::_STEP]))
-        drawings.append(line_plot(lines, x_label, f"{name}, °", width=_WIDE, height=200))
+        drawings.append(line_plot(lines, x_label, f"{name}, °"))
     return drawings
 
 

@@ -23,7 +23,7 @@ IGNORED = Trial("R-FAST-LIO", "kalman", KalmanSettings(rotation="ignored"))
 FIXED = Trial("F-FAST-LIO", "kalman", KalmanSettings())
 CONTINUOUS = Trial("continuous", "continuous")
 
-_SCENES = (("mocap", 75.0, 30.0), ("carpark", 75.0, 30.0), ("campus", 135.0, 30.0))
+_SCENES = (("mocap", 75.0, 24.0), ("carpark", 75.0, 24.0), ("campus", 135.0, 24.0))
 FLIGHTS = tuple(
     Flight(f"{scene}, {kind}", {"scene": scene, **head}, duration, quick, trials)
     for scene, duration, quick in _SCENES

@@ -55,7 +55,7 @@ def _positions(
 ) -> list[Figure]:
     """Draw positions over time, and the errors that are too small to be seen in them."""
     found, truth = _found(flown, scene), flown[f"{scene}, turning"].truth
-    tracks = {label: result.aligned for label, result in found.items()}
+    tracks = {n: r.from_start if r.lost else r.aligned for n, r in found.items()}
     figures = []
     for axis, drawing in zip(
         "xyz", positions_over(truth.times, truth, tracks, "time, s"), strict=True
@@ -67,7 +67,7 @@ def _positions(
         for label, result in found.items()
         if not result.lost
     ]
-    plot = line_plot(errors, "time, s", "distance from the truth, cm", width=1140)
+    plot = line_plot(errors, "time, s", "distance from the truth, cm")
     note = f"Distance from the truth in {where}, of the estimates that did not fail."
     return [*figures, Figure(f"{name}_error", plot, f"{title}, errors", note)]
 
@@ -105,13 +105,9 @@ def _failure(flight: Flown) -> list[Figure]:
         for name, result in (("Ours (kalman)", ours), ("R-FAST-LIO", ignored))
     ]
     errors = [
-        Series(
-            name,
-            result.distance_times[::10],
-            np.log10(np.maximum(result.distances[::10], _LEAST)),
-        )
+        Series(name, flight.truth.times[::10], _log_errors(flight, result)[::10])
         for name, result in (("Ours (kalman)", ours), ("R-FAST-LIO", ignored))
-        if len(result.distances)
+        if result.from_start is not None
     ]
     return [
         Figure(
@@ -131,18 +127,29 @@ def _failure(flight: Flown) -> list[Figure]:
         ),
         Figure(
             "why_c",
-            line_plot(shares, "time, s", "matches that agree, %", top=100, width=1140),
+            line_plot(shares, "time, s", "matches that agree, %", top=100),
             "Why R-FAST-LIO fails, 3",
             "Share of the matches that agree with the pose. Without the rotation those that are left agree "
             "with a carrier that turns once per second, which the gyroscope denies.",
         ),
         Figure(
             "why_d",
-            line_plot(errors, "time, s", "log10 of the distance from the truth in m", width=1140),
+            line_plot(errors, "time, s", "log10 of the distance from the truth in m"),
             "Why R-FAST-LIO fails, 4",
             "How far it is carried away: 0 is one metre, 2 a hundred.",
         ),
     ]
+
+
+def _log_errors(flight: Flown, result: Result) -> Array:
+    """Return log10 of the distances (N,) in m from the truth, given the first pose."""
+    errors = np.full(len(flight.truth.times), np.nan)
+    if result.from_start is not None:
+        there = result.from_start.covers(flight.truth.times)
+        found, _ = result.from_start.interpolate(flight.truth.times[there])
+        distances = np.linalg.norm(found - flight.truth.positions[there], axis=1)
+        errors[there] = np.log10(np.maximum(distances, _LEAST))
+    return errors
 
 
 def _near(points: NDArray[np.float32], path: Array) -> NDArray[np.float32]:

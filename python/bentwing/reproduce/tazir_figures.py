@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 _TWO = ("2c5f8a", "c8331e")  # georeferenced and estimated
 _REACH = 70.0  # m, from the way: farther outside nothing is drawn
 _SLOW, _FAST, _FIXED = "town, 0.5 rad/s", "town, 1 rad/s", "town, fixed"
-_WIDE = 1140
 
 
 def tazir_figures(flown: dict[str, Flown], measured: All) -> list[Figure]:
@@ -94,7 +93,7 @@ def _trajectories(flown: dict[str, Flown]) -> list[Figure]:
     figures = []
     for letter, name in (("a", _SLOW), ("b", _FIXED)):
         flight = flown[name]
-        found = {trial: result.aligned for trial, result in flight.results.items()}
+        found = {n: r.from_start for n, r in flight.results.items()}
         kinds = (
             ("fig07", "Fig. 7", positions_over, "xyz"),
             ("fig08", "Fig. 8", angles_over, ("roll", "pitch", "yaw")),
@@ -131,7 +130,7 @@ def _errors(measured: All) -> list[Figure]:
             figures.append(
                 Figure(
                     f"{number}_{kind}_{trial}",
-                    line_plot(lines, "way, m", f"{kind.upper()}, {unit}", width=_WIDE),
+                    line_plot(lines, "way, m", f"{kind.upper()}, {unit}"),
                     f"{'Fig. 12' if kind == 'rte' else 'Fig. 8'}, {kind.upper()} of {trial}",
                     "Error of the pose when the first one is given.",
                 )
@@ -157,7 +156,7 @@ def _registration(measured: All) -> list[Figure]:
         figures.append(
             Figure(
                 f"fig13{letter}",
-                line_plot(lines, "time, s", "registration RMSE, m", width=_WIDE),
+                line_plot(lines, "time, s", "registration RMSE, m"),
                 f"Fig. 13{letter}, {name}",
                 f"Distance of each scan's points from the keyframes' surfaces; the mean is {rmse.mean():.3f} m.",
             )

@@ -868,8 +868,21 @@ class NdtReference:
         cls, *, voxel_size: float, n_levels: int, sigma: float, roughness: float
     ) -> NdtReference: ...
     def __len__(self) -> int: ...
-    def insert(self, points: NDArray[np.float64], pose: _Transform, *, threads: int = 0) -> None:
-        """Add the points (N, 3), m, of a keyframe; `pose` is that of their frame in the map."""
+    def insert(
+        self,
+        points: NDArray[np.float64],
+        pose: _Transform,
+        *,
+        lidar: _Vector,
+        threads: int = 0,
+    ) -> None:
+        """Add the points of a keyframe.
+
+        Parameters
+        ----------
+        points : (N, 3) float64, m, in a frame of which `pose` is the place in the map
+        lidar : (3,) m, map frame, from where they were seen
+        """
 
     def keep_within(self, centre: _Vector, radius: float, *, threads: int = 0) -> None:
         """Forget what is farther than `radius`, m, from `centre` (3,), m, map frame."""

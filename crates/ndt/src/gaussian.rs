@@ -12,6 +12,11 @@ const MIN_POINTS: u32 = 6;
 /// shape of the surface.
 const MIN_WIDTH: f64 = 0.07;
 
+/// Least cosine between the normal and the mean direction to the lidar. A single scan line that is bent,
+/// over a ridge or down a wall, spreads along the plane in which the lidar turned its beam, and that
+/// is no surface: it contains every ray. True surfaces seen so flatly are measured badly anyway.
+const MIN_FACING: f64 = 0.2;
+
 /// What regularizes the distributions.
 #[derive(Clone, Copy, Debug)]
 pub struct Shape {
@@ -32,12 +37,14 @@ pub(crate) struct Gaussian {
 }
 
 impl Gaussian {
-    /// Distribution of the points in a voxel of edge `size` around `middle`, if they show a surface.
+    /// Distribution of the points in a voxel of edge `size` around `middle`, if they show a surface;
+    /// `facing` is the mean of their unit directions to the lidar.
     ///
     /// The inverse of the covariance would pull scans along the surface too, to where the keyframe's
     /// lines lay and so towards not having moved; what a wide distribution has is therefore taken off.
     pub(crate) fn of(
         moments: &Moments,
+        facing: &Vector3<f64>,
         middle: &Vector3<f64>,
         size: f64,
         shape: &Shape,
@@ -48,7 +55,7 @@ impl Gaussian {
         let covariance = moments.covariance();
         let (values, axes) = sym3::axes(&covariance);
         let wide = (MIN_WIDTH * size).powi(2);
-        if values[1] < wide {
+        if values[1] < wide || axes[0].dot(facing).abs() < MIN_FACING {
             return None;
         }
         let floor = shape.sigma.max(shape.roughness * size).powi(2);
@@ -93,7 +100,8 @@ mod tests {
             let R = UnitQuaternion::from_euler_angles(a, b, 0.0);
             let grid = (0..400).map(|i| R * Vector3::new(f64::from(i % 20) * 0.05 - 0.475, f64::from(i / 20) * 0.05 - 0.475, 0.0));
             let middle = Vector3::new(7.0, -3.0, 2.0);
-            let found = moments(grid).and_then(|m| Gaussian::of(&m, &middle, 1.0, &SHAPE));
+            let facing = R * Vector3::new(0.9, 0.0, 0.3);
+            let found = moments(grid).and_then(|m| Gaussian::of(&m, &facing, &middle, 1.0, &SHAPE));
             prop_assert!(found.is_some());
             if let Some(g) = found {
                 let n = R * Vector3::z();
@@ -118,10 +126,26 @@ mod tests {
                 f64::from(i / 100),
             ) * 0.1
         });
-        let of =
-            |m: Option<Moments>| m.and_then(|m| Gaussian::of(&m, &Vector3::zeros(), 1.0, &SHAPE));
+        let (up, zero) = (Vector3::z(), Vector3::zeros());
+        let of = |m: Option<Moments>| m.and_then(|m| Gaussian::of(&m, &up, &zero, 1.0, &SHAPE));
         assert!(of(moments(line)).is_none());
         assert!(of(moments(few)).is_none());
         assert!(of(moments(full)).is_none());
+    }
+
+    /// Over the edge of a roof a line lies in the plane of the rays; a wall is seen from its side.
+    #[test]
+    fn a_bent_scan_line_says_nothing_and_a_wall_does() {
+        let edge = || {
+            (0..40).map(|i| {
+                let s = f64::from(i) * 0.02 - 0.4;
+                Vector3::new(s, 0.001 * f64::from(i % 3), -s.abs())
+            })
+        };
+        let zero = Vector3::zeros();
+        let of =
+            |facing| moments(edge()).and_then(|m| Gaussian::of(&m, &facing, &zero, 1.0, &SHAPE));
+        assert!(of(Vector3::new(0.2, 0.0, 0.98)).is_none());
+        assert!(of(Vector3::new(0.0, 0.8, 0.6)).is_some());
     }
 }

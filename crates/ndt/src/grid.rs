@@ -15,31 +15,51 @@ const CHUNK: usize = 512;
 /// says stays recent, and a crowded place does not outweigh what is seen there now.
 const GENERATION: u32 = 400;
 
+/// What was seen in one voxel for some time.
+#[derive(Clone, Copy, Debug)]
+struct Seen {
+    moments: Moments,
+    /// Sum of the unit directions from the points to the lidar.
+    facing: Vector3<f64>,
+}
+
+impl Seen {
+    fn of(p: [f64; 3], to_lidar: &Vector3<f64>) -> Self {
+        Self {
+            moments: Moments::of_point(p, 0.0, 0.0),
+            facing: *to_lidar,
+        }
+    }
+}
+
 /// Points seen in one voxel.
 #[derive(Clone, Debug)]
 struct Cell {
     key: u64,
     middle: Vector3<f64>,
-    before: Option<Moments>,
-    now: Moments,
+    before: Option<Seen>,
+    now: Seen,
 }
 
 impl Cell {
-    fn add(&mut self, p: [f64; 3]) {
-        if self.now.n() >= GENERATION {
+    fn add(&mut self, p: [f64; 3], to_lidar: &Vector3<f64>) {
+        if self.now.moments.n() >= GENERATION {
             self.before = Some(self.now);
-            self.now = Moments::of_point(p, 0.0, 0.0);
+            self.now = Seen::of(p, to_lidar);
         } else {
-            self.now.add_point(p, 0.0, 0.0);
+            self.now.moments.add_point(p, 0.0, 0.0);
+            self.now.facing += to_lidar;
         }
     }
 
-    fn moments(&self) -> Moments {
+    fn gaussian(&self, size: f64, shape: &Shape) -> Option<Gaussian> {
         let mut all = self.now;
         if let Some(before) = &self.before {
-            all.merge(before);
+            all.moments.merge(&before.moments);
+            all.facing += before.facing;
         }
-        all
+        let facing = all.facing / f64::from(all.moments.n());
+        Gaussian::of(&all.moments, &facing, &self.middle, size, shape)
     }
 }
 
@@ -80,28 +100,28 @@ impl Grid {
         self.gaussians[*place as usize].as_ref()
     }
 
-    /// Adds points in the map, in their order.
-    pub(crate) fn insert(&mut self, points: &[[f64; 3]], shape: &Shape) {
-        let mut touched: Vec<u32> = points.iter().map(|p| self.add(p)).collect();
+    /// Adds points in the map, in their order, seen from `lidar`.
+    pub(crate) fn insert(&mut self, points: &[[f64; 3]], lidar: &Vector3<f64>, shape: &Shape) {
+        let mut touched: Vec<u32> = points.iter().map(|p| self.add(p, lidar)).collect();
         touched.sort_unstable();
         touched.dedup();
         let cells = &self.cells;
-        let of = |i: &u32| {
-            let cell = &cells[*i as usize];
-            Gaussian::of(&cell.moments(), &cell.middle, self.size, shape)
-        };
+        let of = |i: &u32| cells[*i as usize].gaussian(self.size, shape);
         let made: Vec<Option<Gaussian>> = touched.par_iter().with_min_len(CHUNK).map(of).collect();
         for (i, gaussian) in touched.iter().zip(made) {
             self.gaussians[*i as usize] = gaussian;
         }
     }
 
-    fn add(&mut self, p: &[f64; 3]) -> u32 {
+    fn add(&mut self, p: &[f64; 3], lidar: &Vector3<f64>) -> u32 {
         let key = key(p, 1.0 / self.size);
+        let to_lidar = (lidar - Vector3::from(*p))
+            .try_normalize(0.0)
+            .unwrap_or_default();
         if let Some(&place) = self.places.get(&key) {
             let cell = &mut self.cells[place as usize];
             let middle = cell.middle;
-            cell.add(std::array::from_fn(|i| p[i] - middle[i]));
+            cell.add(std::array::from_fn(|i| p[i] - middle[i]), &to_lidar);
             return place;
         }
         let place = self.cells.len() as u32;
@@ -111,7 +131,7 @@ impl Grid {
             key,
             middle,
             before: None,
-            now: Moments::of_point(std::array::from_fn(|i| p[i] - middle[i]), 0.0, 0.0),
+            now: Seen::of(std::array::from_fn(|i| p[i] - middle[i]), &to_lidar),
         });
         self.gaussians.push(None);
         place

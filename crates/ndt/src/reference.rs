@@ -39,13 +39,19 @@ impl Reference {
         self.levels.iter().map(Grid::n_surfaces).sum()
     }
 
-    /// Adds the points of a keyframe, `T_map_scan` being its pose.
-    pub fn insert(&mut self, points: &[[f64; 3]], T_map_scan: &Isometry3<f64>) {
+    /// Adds the points of a keyframe, `T_map_scan` being its pose and `lidar`, m, map frame, the place
+    /// from which they were seen.
+    pub fn insert(
+        &mut self,
+        points: &[[f64; 3]],
+        T_map_scan: &Isometry3<f64>,
+        lidar: &Vector3<f64>,
+    ) {
         let placed: Vec<[f64; 3]> = (points.par_iter())
             .map(|p| T_map_scan.transform_point(&(*p).into()).coords.into())
             .collect();
         let shape = self.shape;
-        (self.levels.par_iter_mut()).for_each(|level| level.insert(&placed, &shape));
+        (self.levels.par_iter_mut()).for_each(|level| level.insert(&placed, lidar, &shape));
     }
 
     /// Forgets what is farther than `radius`, m, from `centre`, map frame.

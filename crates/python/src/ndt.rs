@@ -56,18 +56,20 @@ impl NdtReference {
     }
 
     /// Adds the points of a keyframe.
-    #[pyo3(signature = (points, pose, *, threads = 0))]
+    #[pyo3(signature = (points, pose, *, lidar, threads = 0))]
     fn insert(
         &mut self,
         py: Python<'_>,
         points: PyReadonlyArray2<'_, f64>,
         pose: Transform,
+        lidar: [f64; 3],
         threads: usize,
     ) -> PyResult<()> {
         let points = finite_rows("points", &points)?;
         let pose = isometry("pose", &pose)?;
+        let lidar = finite_vector("lidar", lidar)?;
         let reference = &mut self.0;
-        in_pool(py, threads, || reference.insert(points, &pose))
+        in_pool(py, threads, || reference.insert(points, &pose, &lidar))
     }
 
     /// Forgets what is farther than `radius` from `centre`.

@@ -49,6 +49,9 @@ def simulate_command(  # noqa: PLR0917 - one parameter per option
     max_range: Annotated[
         float | None, Option(help="The lidar sees up to here, m.", show_default="the sensor's")
     ] = None,
+    speed: Annotated[
+        float | None, Option(help="Of a tour, about, m/s.", show_default="the scene's")
+    ] = None,
     flight: Annotated[
         str | None,
         Option(help=f"One of {_names(FlightName)}.", show_default="survey where there is no tour"),
@@ -78,6 +81,7 @@ def simulate_command(  # noqa: PLR0917 - one parameter per option
         "max_range": max_range,
         "events": event or (),
         "stall": stall,
+        "speed": speed,
         "flight": flight,
         "gnss": gnss,
         "calibrated": calibrated,

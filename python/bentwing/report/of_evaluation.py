@@ -27,6 +27,14 @@ _DEGREES = 180.0 / np.pi
 
 def draw_evaluation(folder: EvaluationFolder, evaluation: Evaluation) -> None:
     """Write a figure for every answer that has a distribution."""
+    if evaluation.map is not None:
+        write_error_cloud(folder.file("map_error.ply"), evaluation.map)
+    for name, drawing in evaluation_drawings(evaluation).items():
+        write_text(folder.file(f"{name}.svg"), standalone(drawing))
+
+
+def evaluation_drawings(evaluation: Evaluation) -> dict[str, str]:
+    """Draw every answer that has a distribution, as SVG by name."""
     drawings: dict[str, str] = {}
     if evaluation.trajectory is not None:
         drawings |= _trajectory(evaluation.trajectory)
@@ -34,10 +42,7 @@ def draw_evaluation(folder: EvaluationFolder, evaluation: Evaluation) -> None:
         drawings |= _drift(evaluation.drift.lengths)
     if evaluation.map is not None:
         drawings |= _map(evaluation.map)
-        write_error_cloud(folder.file("map_error.ply"), evaluation.map)
-    drawings |= _alone(evaluation)
-    for name, drawing in drawings.items():
-        write_text(folder.file(f"{name}.svg"), standalone(drawing))
+    return drawings | _alone(evaluation)
 
 
 def _trajectory(error: TrackError) -> dict[str, str]:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from bentwing.report.axes import Axes
 
-SERIES_COLOURS = ("#2c5f8a", "#c8553d", "#4d8b57", "#8a6d3b")
+SERIES_COLOURS = ("#2c5f8a", "#c8553d", "#4d8b57", "#8a6d3b", "#7a5c99", "#3b9aa0")
 _MOST_POINTS = 1200  # of one line; more are drawn as their envelope
 
 

@@ -11,15 +11,13 @@ from typing import TYPE_CHECKING
 
 from bentwing.report.colours import gradient
 from bentwing.report.picture import encode_png
+from bentwing.report.way import draw_way
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from bentwing.report.picture import View
+    from bentwing.report.way import Way
 
 INK, FAINT, GRID = "#3c4653", "#6b7684", "#e4e8ed"
-_MOST_POINTS = 1200  # of a path
 _VIEW_BOX = re.compile(r'viewBox="0 0 (\d+) (\d+)"')
 
 
@@ -28,18 +26,18 @@ def map_view(
     value_label: str,
     table: tuple[str, ...],
     *,
-    path: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None,
+    way: Way | None = None,
     name: str = "map",
     text_size: int = 20,
 ) -> str:
-    """Picture of a map with scale bar, colour legend and, if given, the carrier's path.
+    """Picture of a map with scale bar, colour legend and, if given, the carrier's way.
 
     Parameters
     ----------
     view : the picture
     value_label : what the colour shows, with unit
     table : its colour map
-    path : coordinates of the path across and up, each (N,) m
+    way : of the carrier
     name : says what is seen, for those who cannot see it
     text_size : pixels of the picture
     """
@@ -50,8 +48,8 @@ def map_view(
         open_svg(width, full, name),
         f'<image width="{width}" height="{height}" href="data:image/png;base64,{data}"/>',
     ]
-    if path is not None:
-        parts.append(_path(view, *path))
+    if way is not None:
+        parts.append(draw_way(view, way))
     parts += _scale_bar(view, height + 24.0, text_size)
     parts += _legend(view, value_label, table, (float(width), height + 14.0), text_size)
     return "".join([*parts, "</svg>"])
@@ -65,19 +63,6 @@ def nice_ticks(low: float, high: float, n: int) -> list[float]:
     step = next(m * magnitude for m in (1, 2, 5, 10) if m * magnitude >= raw * 0.999)
     first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
     return [i * step for i in range(first, last + 1)] or [low]
-
-
-def _path(view: View, across: NDArray[np.float64], up: NDArray[np.float64]) -> str:
-    every = max(len(across) // _MOST_POINTS, 1)
-    x = (across[::every] - view.left) / view.pixel
-    y = (view.top - up[::every]) / view.pixel
-    points = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y, strict=True))
-    line = f'<polyline points="{points}" fill="none" stroke-linejoin="round" '
-    start = f'<circle cx="{x[0]:.1f}" cy="{y[0]:.1f}" r="8" fill="#fff" stroke="#c8331e" stroke-width="4"/>'
-    return (
-        f'{line}stroke="#fff" stroke-width="7" stroke-opacity=".75"/>'
-        f'{line}stroke="#c8331e" stroke-width="3.6"/>{start}'
-    )
 
 
 def _scale_bar(view: View, y: float, text_size: int) -> list[str]:

@@ -11,6 +11,7 @@ import numpy as np
 from bentwing.report.colours import HEIGHT, TIME
 from bentwing.report.picture import paint, project, render
 from bentwing.report.svg import map_view
+from bentwing.report.way import Way
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -58,9 +59,9 @@ def draw_views(
     slab = np.abs((points - centre) @ beside) < SLAB / 2
     note = "Points above the sensor are left out, so that the roof does not hide the floor."
     return MapViews(
-        oblique=_oblique(plan, along, beside),
+        oblique=oblique_view(plan, plan[:, 2], "height, m"),
         plan_height=map_view(
-            by_height, "height, m", HEIGHT, path=(path[:, 0], path[:, 1]), name="Plan"
+            by_height, "height, m", HEIGHT, way=Way(path[:, 0], path[:, 1]), name="Plan"
         ),
         plan_time=map_view(by_time, "time, s", TIME, name="Plan by time"),
         side=_upright(points, along, beside, "Side view"),
@@ -91,17 +92,40 @@ def _followed(trajectory: Trajectory, times: NDArray[np.float64], axis: int) -> 
     return np.interp(times, trajectory.times, trajectory.positions[:, axis])
 
 
-def _oblique(
-    points: NDArray[np.float64], along: NDArray[np.float64], beside: NDArray[np.float64]
+def oblique_view(
+    points: NDArray[np.float64],
+    values: NDArray[np.float64],
+    label: str,
+    table: tuple[str, ...] = HEIGHT,
+    *,
+    path: NDArray[np.float64] | None = None,
+    close_gaps: int = 3,
 ) -> str:
-    """Draw the map from 35° above the horizon, a quarter turned from its longer side."""
+    """Draw a map from 35° above the horizon, a quarter turned from its longer side.
+
+    Parameters
+    ----------
+    points : (N, 3) m, map frame
+    values : (N,) what the colour shows
+    label : of the values, with unit
+    table : colour map
+    path : (M, 3) m, of the sensor, drawn over the map by its time
+    close_gaps : pixels
+    """
+    along, beside = _directions(points)
     turn, lift = np.radians([28.0, 35.0])
     across = np.cos(turn) * along + np.sin(turn) * beside
     level = np.cos(turn) * beside - np.sin(turn) * along  # away from the viewer
     up = np.sin(lift) * level + np.cos(lift) * np.array([0.0, 0.0, 1.0])
     toward = -np.cos(lift) * level + np.sin(lift) * np.array([0.0, 0.0, 1.0])
-    view = render(points @ across, points @ up, points @ toward, points[:, 2], max_height=640)
-    return map_view(view, "height, m", HEIGHT, name="Oblique view", text_size=13)
+    seen = project(
+        points @ across, points @ up, points @ toward, max_height=640, close_gaps=close_gaps
+    )
+    way = None
+    if path is not None:
+        way = Way(path @ across, path @ up, np.linspace(0.0, 1.0, len(path)), TIME)
+    view = paint(seen, values, table=table)
+    return map_view(view, label, table, way=way, name="Oblique view", text_size=13)
 
 
 def _upright(

@@ -12,7 +12,7 @@ from bentwing.report.histogram import histogram
 from bentwing.report.plot import Series, line_plot
 from bentwing.reproduce.block_diagram import controller_diagram
 from bentwing.reproduce.bumper_view import bumper_figures
-from bentwing.reproduce.figure import Figure, Part
+from bentwing.reproduce.figure import Assignment, Figure, Part
 from bentwing.simulate.plant.drives import FLAPS
 from bentwing.simulate.plant.flights import CONTROL_STEP, Drive, fly
 from bentwing.simulate.plant.outcomes import SPIN_UP
@@ -32,9 +32,9 @@ _BREEZE = Weather(max_wind=4.0, max_mean=1.5)
 _WINDY = Weather(max_mean=4.0, gust_interval=8.0)
 
 
-def flight_part(quick: bool) -> Part:  # noqa: FBT001 - the parts share this signature
-    """Make the figures; `quick` flies a fifth of the time."""
-    minutes = 1.5 if quick else 7.0
+def flight_part(assignment: Assignment) -> Part:
+    """Make the figures; a quick assignment flies a fifth of the time."""
+    minutes = 1.5 if assignment.quick else 7.0
     figures, numbers = _fig9(60.0 * minutes)
     step, answer = _fig11()
     return Part(

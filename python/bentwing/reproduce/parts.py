@@ -5,13 +5,20 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
-from html import escape
-from importlib.resources import files
 from typing import TYPE_CHECKING
 
-from bentwing.atomic import write_text
+from bentwing.atomic import write_bytes, write_text
 from bentwing.errors import UsageError
+from bentwing.progress import Progress
+from bentwing.report.raster import rasterize
+from bentwing.report.svg import standalone
+from bentwing.reproduce.figure import Assignment
 from bentwing.reproduce.flight import flight_part
+from bentwing.reproduce.fu2023 import fu_part
+from bentwing.reproduce.mapping import mapping_part
+from bentwing.reproduce.page import page
+from bentwing.reproduce.tazir2020 import tazir_part
+from bentwing.run_record import bentwing_version, plain
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -19,21 +26,32 @@ if TYPE_CHECKING:
 
     from bentwing.reproduce.figure import Part
 
-PARTS: dict[str, dict[str, Callable[[bool], Part]]] = {"kaul2015": {"flight": flight_part}}
+PARTS: dict[str, dict[str, Callable[[Assignment], Part]]] = {
+    "kaul2015": {"mapping": mapping_part, "flight": flight_part},
+    "fu2023": {"mapping": fu_part},
+    "tazir2020": {"mapping": tazir_part},
+}
 
 
 @dataclass(frozen=True, slots=True)
 class Reproduced:
-    """Files that were written: a page per part and the figures on it."""
+    """What was made, and the files that were written: one page, and the figures on it."""
 
-    pages: list[Path]
+    page: Path
+    parts: list[Part]
     figures: list[Path]
 
 
 def reproduce(
-    paper: str, out: Path, parts: Sequence[str] = (), *, quick: bool = False
+    paper: str,
+    out: Path,
+    parts: Sequence[str] = (),
+    *,
+    quick: bool = False,
+    seed: int = 1,
+    progress: Progress | None = None,
 ) -> Reproduced:
-    """Write the pages and figures of a paper's parts (all by default) into the folder `out`.
+    """Write report.html, the figures and the tables of a paper's parts (default: all) into `out`.
 
     Raises
     ------
@@ -48,32 +66,23 @@ def reproduce(
         msg = f"{paper} has no part {', '.join(unknown)}; it has {', '.join(PARTS[paper])}"
         raise UsageError(msg)
     out.mkdir(parents=True, exist_ok=True)
-    written = Reproduced([], [])
+    written = Reproduced(out / "report.html", [], [])
     for name in parts or PARTS[paper]:
-        _write(out, name, PARTS[paper][name](quick), written)
+        assignment = Assignment(out, quick, seed, progress or Progress())
+        _write(out, name, PARTS[paper][name](assignment), written)
+    scale = "quick: shorter flights than the paper's" if quick else "at the paper's size"
+    subtitle = f"bentwing {bentwing_version()} · seed {seed} · {scale}"
+    write_text(written.page, page(f"{paper}, reproduced", subtitle, written.parts))
     return written
 
 
 def _write(out: Path, name: str, part: Part, written: Reproduced) -> None:
     for figure in part.figures:
         path = out / f"{figure.name}.svg"
-        write_text(path, figure.drawing)
+        write_text(path, standalone(figure.drawing))
+        write_bytes(path.with_suffix(".png"), rasterize(figure.drawing))
         written.figures.append(path)
-    write_text(out / f"{name}.json", json.dumps(part.numbers, indent=1) + "\n")
-    page = out / f"{name}.html"
-    write_text(page, _page(part))
-    written.pages.append(page)
-
-
-def _page(part: Part) -> str:
-    style = files("bentwing.report").joinpath("style.css").read_text(encoding="utf-8")
-    figures = "".join(
-        f"<figure>{f.drawing}<figcaption><b>{escape(f.title)}</b> {escape(f.note)}</figcaption></figure>"
-        for f in part.figures
-    )
-    return (
-        '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
-        f"<title>{escape(part.title)}</title><style>{style}</style></head><body><main>"
-        f'<header><h1>{escape(part.title)}</h1></header><div class="grid">{figures}</div>'
-        "</main></body></html>\n"
-    )
+    if part.tables:
+        write_text(out / f"{name}.md", "\n".join(table.markdown() for table in part.tables))
+    write_text(out / f"{name}.json", json.dumps(plain(part.numbers), indent=1) + "\n")
+    written.parts.append(part)

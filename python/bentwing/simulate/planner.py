@@ -67,6 +67,26 @@ def plan_tour(
     return Tour(pad, nodes[route])
 
 
+def follow_route(world: World, length: float) -> Tour:
+    """Follow the site's route in as many whole rounds as come nearest to `length` m.
+
+    If not even half a round does, it leads as far along the route as there is time to come back.
+    """
+    corners = np.array(world.site.route)
+    closed = np.vstack([corners, corners[:1]])
+    reached = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(closed, axis=0), axis=1))])
+    rounds = round(length / reached[-1])
+    pad = _pad_below(world, corners[0])
+    if pad is None:
+        msg = "no level ground to take off from was found below the route: try another seed"
+        raise UsageError(msg)
+    if rounds:
+        return Tour(pad, np.vstack([*[corners] * rounds, corners[:1]]))
+    turn = np.array([np.interp(0.5 * length, reached, closed[:, i]) for i in range(3)])
+    there = np.vstack([closed[reached < 0.5 * length], turn])
+    return Tour(pad, np.vstack([there, there[-2::-1]]))
+
+
 def free_points(
     world: World,
     rng: np.random.Generator,

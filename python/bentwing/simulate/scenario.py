@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -25,7 +25,10 @@ if TYPE_CHECKING:
 
     from bentwing.simulate.rig import Rig
 
-SceneName = Literal["courtyard", "office", "forest", "cave", "mine", "town", "walls", "dam"]
+SceneName = Literal[
+    "courtyard", "compound", "office", "forest", "cave", "mine", "town", "walls", "dam",
+    "mocap", "carpark", "campus",
+]  # fmt: skip
 HeadName = Literal["hokuyo-spin", "hokuyo-nod", "vlp16-fixed", "vlp16-side", "vlp16-motor"]
 SpinName = Literal["steady", "plant"]
 FlightName = Literal["tour", "survey", "stand"]
@@ -49,6 +52,7 @@ class Scenario(BaseModel):
     spin : of `hokuyo-spin`: a `steady` rate that wanders a little, or driven by the simulated `plant`
         of downdraft, vanes and controller
     max_range : m, beyond it the lidar sees nothing; by default what the sensor can do
+    speed : m/s, at about which a tour is flown; by default what suits the scene
     events : what goes wrong
     stall : s, how long the head does not turn in the event `spin-stall`
     gnss : a receiver, `rtk` or `single`; by default there is none
@@ -69,6 +73,7 @@ class Scenario(BaseModel):
     motor_rate: float = Field(default=1.0, gt=0.0, le=10.0)
     spin: SpinName = "steady"
     max_range: float | None = Field(default=None, gt=1.0)
+    speed: float | None = Field(default=None, gt=0.1, le=5.0)
     events: tuple[EventName, ...] = ()
     stall: float = Field(default=STALL, gt=0.0, le=60.0)
     gnss: ReceiverName | None = None
@@ -140,7 +145,8 @@ def prepare(scenario: Scenario) -> Setup:
     """Build the world, plan the motion and hang the sensors on it."""
     first = LEAD if "motion-start" in scenario.events else 0.0
     last = first + scenario.duration
-    world = World(SCENES[scenario.scene](scenario.rng("scene")))
+    site = SCENES[scenario.scene](scenario.rng("scene"))
+    world = World(site if scenario.speed is None else replace(site, speed=scenario.speed))
     rig = build_rig(scenario, world, last)
     rng = scenario.rng("lidar")
     latency = float(rng.uniform(0.001, 0.004) * rng.choice([-1.0, 1.0]))

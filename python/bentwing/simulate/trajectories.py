@@ -11,7 +11,7 @@ import numpy as np
 from bentwing.errors import UsageError
 from bentwing.simulate.events import gust_shifts
 from bentwing.simulate.kinematics import Motion, translating
-from bentwing.simulate.planner import Tour, plan_tour
+from bentwing.simulate.planner import Tour, follow_route, plan_tour
 from bentwing.simulate.splines import Spline, knot_times
 
 if TYPE_CHECKING:
@@ -91,14 +91,18 @@ class Flight:
 def quadrotor_flight(
     world: World, rng: np.random.Generator, duration: float, ground_clearance: float, *, gusts: bool
 ) -> Flight:
-    """Rest, take off, fly a tour at about the site's speed and land where it began.
+    """Rest, take off, fly the site's route or a tour at about its speed and land where it began.
 
     `ground_clearance` is the height of the body's origin above the pad when standing. The tour
     keeps 0.8 m from every surface, which is verified on the final curve.
     """
     cruise = duration - 11.0 - 2.2 * _climb_time(world.site.low[2])
     for _ in range(ATTEMPTS):
-        tour = plan_tour(world, rng, world.site.speed * max(cruise, 3.0), 1.0)
+        length = world.site.speed * max(cruise, 3.0)
+        if world.site.route:
+            tour = follow_route(world, length)
+        else:
+            tour = plan_tour(world, rng, length, 1.0)
         phases = _phases(rng, duration, tour.way_points[0, 2] - tour.pad[2])
         position = _position(rng, tour, phases, duration, ground_clearance)
         if gusts:

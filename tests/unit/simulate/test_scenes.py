@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from bentwing._core import Scene
-from bentwing.simulate.planner import plan_tour
+from bentwing.simulate.planner import follow_route, plan_tour
 from bentwing.simulate.scenario import Scenario, prepare
 from bentwing.simulate.scenes import SCENES, World
 from bentwing.simulate.scenes.mesh import ball, box, column, gable
@@ -77,3 +77,25 @@ def test_another_flight_seed_flies_elsewhere_in_the_same_world():
     times = np.array([0.0, 12.0])
     apart = np.linalg.norm(one.rig.imu(times).p - other.rig.imu(times).p, axis=1)
     assert apart.min() > 0.5
+
+
+@pytest.mark.parametrize("name", ["mocap", "carpark", "campus"])
+@pytest.mark.parametrize(("share", "rounds"), [(0.3, 0), (0.9, 1), (3.1, 3)])
+def test_a_route_is_followed_in_whole_rounds_or_there_and_back(name, share, rounds):
+    site = SCENES[name](np.random.default_rng(2))
+    corners = np.array(site.route)
+    lap = np.linalg.norm(np.diff(np.vstack([corners, corners[:1]]), axis=0), axis=1).sum()
+    tour = follow_route(World(site), share * lap)
+    flown = np.linalg.norm(np.diff(tour.way_points, axis=0), axis=1).sum()
+    assert flown == pytest.approx((rounds or share) * lap)
+    np.testing.assert_allclose(tour.way_points[[0, -1]], corners[[0, 0]])
+    assert tour.pad[2] < tour.way_points[0, 2] - 1.0
+
+
+@pytest.mark.parametrize("name", ["mocap", "carpark", "campus"])
+@pytest.mark.parametrize("seed", range(1, 7))
+def test_a_route_can_be_flown_with_every_seed(name, seed):
+    setup = prepare(Scenario(scene=name, head="vlp16-motor", duration=60.0, seed=seed))
+    positions = setup.rig.imu(np.arange(0.0, 60.0, 0.5)).p
+    assert np.ptp(positions[:, 0]) > 3.0
+    assert positions[:, 2].max() < 6.0

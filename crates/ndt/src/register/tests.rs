@@ -61,7 +61,8 @@ fn what_no_wall_shows_stays_as_expected() -> Result<(), NdtError> {
         roughness: 0.03,
     };
     let mut reference = Reference::new(1.0, 3, shape);
-    reference.insert(&plane, &Isometry3::identity());
+    let lidar = Vector3::new(5.0, 5.0, 5.0);
+    reference.insert(&plane, &Isometry3::identity(), &lidar);
     let start = pose([0.0; 3], [0.07, -0.05, 0.04]);
     let scan: Vec<[f64; 3]> = (plane.iter().step_by(3))
         .filter(|p| p[0] > 2.0 && p[0] < 7.0)

@@ -28,7 +28,8 @@ pub(crate) fn room() -> (Reference, Vec<[f64; 3]>) {
         roughness: 0.03,
     };
     let mut reference = Reference::new(1.0, 3, shape);
-    reference.insert(&points, &Isometry3::identity());
+    let lidar = Vector3::new(5.0, 5.0, 5.0);
+    reference.insert(&points, &Isometry3::identity(), &lidar);
     (reference, points)
 }
 

@@ -77,7 +77,9 @@ class Keyframes:
         """
         if self._settings.reference == "last":
             self.reference = self._nothing()
-        self.reference.insert(points, _pair(pose), threads=self._threads)
+        self.reference.insert(
+            points, _pair(pose), lidar=lidar.translation.tolist(), threads=self._threads
+        )
         self.n_keyframes += 1
         self._last = lidar
         self._sweep(lidar)

@@ -17,11 +17,19 @@ def courtyard(rng: np.random.Generator) -> Site:
     length, width = rng.uniform(28.0, 32.0), rng.uniform(18.0, 21.0)
     height = smooth_noise(rng, 6.0, 0.035)
     floor = ground((-2.0, length + 2.0), (-2.0, width + 2.0), 0.5, height)
-    mesh = merge([floor, *_facades(rng, length, width), *_things(rng, length, width)])
+    walls = facades(rng, (length, width), (6.0, 9.0), (1.1, 4.0))
+    mesh = merge([floor, *walls, *_things(rng, length, width)])
     return Site(mesh, (2.0, 2.0, 1.5), (length - 2.0, width - 2.0, 5.0), pad_below=0.2, speed=1.2)
 
 
-def _facades(rng: np.random.Generator, length: float, width: float) -> list[Mesh]:
+def facades(
+    rng: np.random.Generator,
+    size: tuple[float, float],
+    heights: tuple[float, float],
+    sills: tuple[float, ...],
+) -> list[Mesh]:
+    """Close a yard of `size` m by four facades of any of `heights`, with a door and windows each."""
+    length, width = size
     sides = [
         ((length, 0.0, -0.2), np.pi, length),
         ((length, width, -0.2), -np.pi / 2, width),
@@ -30,8 +38,8 @@ def _facades(rng: np.random.Generator, length: float, width: float) -> list[Mesh
     ]
     parts = []
     for at, yaw, extent in sides:
-        openings = [o for o in windows(extent, (1.1, 4.0), rng.uniform(2.4, 3.4)) if o[0] > DOOR[1]]
-        wall = facade(extent, rng.uniform(6.0, 9.0), [DOOR, *openings], rng.uniform(0.12, 0.25))
+        openings = [o for o in windows(extent, sills, rng.uniform(2.4, 3.4)) if o[0] > DOOR[1]]
+        wall = facade(extent, rng.uniform(*heights), [DOOR, *openings], rng.uniform(0.12, 0.25))
         parts.append(wall.moved(at, yaw))
     return parts
 

@@ -45,6 +45,7 @@ class Site:
     pad_below : m, highest ground from which to take off
     speed : m/s, at which one flies here
     survey : the line to fly instead of a tour through the box, where there is one
+    route : corners of a closed way, m, that a tour follows here instead of choosing its own
     """
 
     mesh: Mesh
@@ -53,6 +54,7 @@ class Site:
     pad_below: float
     speed: float
     survey: Survey | None = None
+    route: tuple[Point, ...] = ()
 
 
 class World:

@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""An estimator on a simulated recording, beside the truth of the recording."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import yaml
+
+from bentwing import estimators
+from bentwing.errors import BentwingError
+from bentwing.estimators.interface import Calibration
+from bentwing.estimators.mount import FixedMount, MotorMount, Pose
+from bentwing.map.project import project
+from bentwing.preprocess import preprocess
+from bentwing.recording import LidarBatch, Payload, Recording
+from bentwing.trajectory import Trajectory, read_tum
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from bentwing.estimators.interface import Estimate, Estimator
+    from bentwing.estimators.mount import Mount
+
+    Array = NDArray[np.float64]
+
+_SAMPLE = 400_000  # points that are kept of a recording, for pictures
+_POINT_RATE = 3e5  # 1/s, of a VLP-16
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """An algorithm: estimator and settings (None: the defaults), by its name in the tables."""
+
+    name: str
+    estimator: str
+    settings: Any = None
+
+
+@dataclass(frozen=True, slots=True)
+class Attempt:
+    """What became of a trial.
+
+    Attributes
+    ----------
+    estimate : None if the estimator gave up
+    why : the reason, if so
+    engine : the estimator, for what only it knows
+    truth : poses of the IMU on the recording's clock
+    lidar : some of the returns, evenly chosen
+    length : s, of the recording
+    seconds, cpu : wall and processor time of the estimate, reading included, s
+    """
+
+    estimate: Estimate | None
+    why: str
+    engine: Estimator
+    truth: Trajectory
+    lidar: list[LidarBatch]
+    length: float
+    seconds: float
+    cpu: float
+
+
+def attempt(
+    folder: Path, trial: Trial, threads: int, shown: Callable[[float], None] | None = None
+) -> Attempt:
+    """Run an estimator, open loop, on the recording in a folder that `simulate` has written.
+
+    Parameters
+    ----------
+    shown : called with the seconds of the recording that are done since the last call
+    """
+    payload = Payload.load(folder / "payload.yaml")
+    engine = estimators.create(trial.estimator, payload, trial.settings, threads)
+    kept: list[LidarBatch] = []
+    estimate, why, reached = None, "", 0.0
+    with Recording(folder / "recording.bag", payload) as recording:
+        truth, _ = read_tum(folder / "truth_trajectory.txt", recording.clock.start_ns)
+        length = recording.duration
+        every = slice(None, None, int(_POINT_RATE * length / _SAMPLE) | 1)
+        cpu, began = time.process_time(), time.perf_counter()
+        try:
+            for batch in preprocess(recording.batches(), payload, Counter()):
+                engine.feed(batch)
+                if isinstance(batch, LidarBatch):
+                    kept.append(batch.where(every))
+                    if shown is not None and len(batch.times):
+                        shown(float(batch.times[-1]) - reached)
+                        reached = float(batch.times[-1])
+            estimate = engine.result()
+        except BentwingError as error:
+            why = str(error)
+    if shown is not None:
+        shown(length - reached)
+    seconds, cpu = time.perf_counter() - began, time.process_time() - cpu
+    return Attempt(estimate, why, engine, truth, kept, length, seconds, cpu)
+
+
+def true_calibration(folder: Path) -> Calibration:
+    """Return the latency and the mounts as the simulated head truly has them."""
+    true = yaml.safe_load((folder / "truth_calibration.yaml").read_text(encoding="utf-8"))
+    encoder = Payload.load(folder / "payload.yaml").encoder
+    mount: Mount
+    if encoder is None:
+        mount = FixedMount(_pose(true["T_imu_lidar"]))
+    else:
+        mount = MotorMount(
+            _pose(true["encoder"]["T_imu_motor"]),
+            np.array(encoder.axis, np.float64),
+            true["encoder_zero"],
+            _pose(true["encoder"]["T_motor_lidar"]),
+        )
+    none = np.zeros(3)
+    return Calibration(true["latency"], mount, none, none, none)
+
+
+def points_of(
+    lidar: Sequence[LidarBatch], trajectory: Trajectory, calibration: Calibration
+) -> Array:
+    """Put returns where they were measured: points (N, 3) m."""
+    chunks = [chunk.points for chunk in project(lidar, trajectory, calibration, threads=1)]
+    return np.concatenate(chunks) if chunks else np.zeros((0, 3))
+
+
+def motor_stopped(lidar: Sequence[LidarBatch]) -> list[LidarBatch]:
+    """Give all returns the motor's first angle, as if it stood still; none without a motor."""
+    turned = [batch for batch in lidar if batch.angles is not None and len(batch.angles)]
+    return [replace(b, angles=np.full(len(b.times), turned[0].angles[0])) for b in turned]  # type: ignore[index]
+
+
+def _pose(described: dict[str, list[float]]) -> Pose:
+    return Pose(np.array(described["translation"]), np.array(described["quaternion"]))
+
+
+@dataclass(frozen=True, slots=True)
+class Flight:
+    """A simulated flight, and who estimates it.
+
+    Attributes
+    ----------
+    name : by which its results are found
+    scenario : fields of a `Scenario`, without duration and seed
+    duration, quick_duration : s
+    trials : in the order of the tables
+    """
+
+    name: str
+    scenario: dict[str, Any]
+    duration: float
+    quick_duration: float
+    trials: tuple[Trial, ...] = field(default=())
+
+    def seconds(self, *, quick: bool) -> float:
+        """Length of the recording."""
+        return self.quick_duration if quick else self.duration

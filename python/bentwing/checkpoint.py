@@ -29,7 +29,9 @@ if TYPE_CHECKING:
 NAME = "checkpoint.npz"
 _TRAJECTORY = ("times", "positions", "quats_xyzw")
 # What the stages have written into the record.
-_RECORDED = ("counts", "timings", "warnings", "calibration", "loop_closure", "segments", "windows")
+_RECORDED = (
+    "counts", "timings", "warnings", "calibration", "loop_closure", "merging", "segments", "windows",
+)  # fmt: skip
 # What must be the same for a run to go on; the number of threads changes no bit.
 _ASKED = ("settings", "inputs")
 _FREE = frozenset({"threads"})

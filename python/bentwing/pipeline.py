@@ -11,11 +11,13 @@ from typing import TYPE_CHECKING, Any
 from bentwing import estimators
 from bentwing.checkpoint import Checkpoint
 from bentwing.errors import EstimationError
+from bentwing.estimators.segments import GUESSED
 from bentwing.global_registration import Budget, GlobalSettings, close_loops
 from bentwing.map.project import project
 from bentwing.map.sample import MapSample
 from bentwing.map.thin import thin
 from bentwing.map.writer import open_map, require_format
+from bentwing.merging.segments import close_segments
 from bentwing.preprocess import RecordingPart
 from bentwing.progress import Progress
 from bentwing.recording import Recording
@@ -28,7 +30,7 @@ from bentwing.run_settings import described_settings, load_payload
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from bentwing.estimators.interface import Estimator
+    from bentwing.estimators.interface import Estimate, Estimator
     from bentwing.progress import Stage
     from bentwing.recording import Payload
 
@@ -144,13 +146,31 @@ def _close_loops(
     watch.note(f"loops: {budget.sentence()}")
     with folder.stage("loops"), watch.stage("loops", part.length) as shown:
         batches = part.batches(shown, Counter())  # what is dropped was counted in the first pass
-        closed = close_loops(
-            run.estimate, batches, part.payload, settings=settings, budget=budget, threads=threads
-        )
+        if len(run.estimate.segments) > 1:
+            closed, folder.record["merging"] = close_segments(
+                run.estimate, batches, part.payload, budget=budget, threads=threads
+            )
+            _forget_guesses(folder, closed.estimate)
+        else:
+            closed = close_loops(
+                run.estimate,
+                batches,
+                part.payload,
+                settings=settings,
+                budget=budget,
+                threads=threads,
+            )
     run.estimate = closed.estimate
     folder.record["loop_closure"] = closed.record
     folder.add_estimate(run.estimate)
     folder.write_trajectory("trajectory.txt", run.estimate, part.recording.clock.start_ns)
+
+
+def _forget_guesses(folder: RunFolder, merged: Estimate) -> None:
+    """Take back the warnings of breaks that were healed; what is true now is added with the estimate."""
+    folder.record["warnings"] = [
+        w for w in folder.record["warnings"] if GUESSED not in w or w in merged.warnings
+    ]
 
 
 def _write_map(

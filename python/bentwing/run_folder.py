@@ -68,6 +68,7 @@ class RunFolder:
             "warnings": [],
             "calibration": None,
             "loop_closure": None,
+            "merging": None,
             "segments": [],
             "windows": [],
             "peak_memory_mb": None,

@@ -47,7 +47,9 @@ class MergedScore:
 def merged_score(simulated: Sequence[Path], folder: Path) -> MergedScore:
     """Compare a merged map with its flights, given in the order of the runs."""
     runs = json.loads((folder / "run.json").read_text())["runs"]
-    flights = [_flight(sim, folder / run["trajectory"]) for sim, run in zip(simulated, runs, strict=True)]
+    flights = [
+        _flight(sim, folder / run["trajectory"]) for sim, run in zip(simulated, runs, strict=True)
+    ]
     ates = [_error(estimate, truth) for estimate, truth, _ in flights]
     placed = []
     for sim, run in zip(simulated, runs, strict=True):
@@ -56,7 +58,10 @@ def merged_score(simulated: Sequence[Path], folder: Path) -> MergedScore:
     scene = read_scene(simulated[0] / "truth_scene.ply")
     points = sampled(read_points(next(folder.glob("map.*"))))
     best = np.concatenate(
-        [best_points(sim, truth, origin, in_flight(truth)) for sim, (_, truth, origin) in zip(simulated, flights, strict=True)]
+        [
+            best_points(sim, truth, origin, in_flight(truth))
+            for sim, (_, truth, origin) in zip(simulated, flights, strict=True)
+        ]
     )
     R, t, errors = _aligned_as_one([flight[:2] for flight in flights])
     error = surface_error(
@@ -99,9 +104,7 @@ def _aligned_as_one(
 ) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
     """Rotation and shift of all runs together to the truth, and the errors (N, 3) of each, m."""
     pairs = [_pairs(*flight) for flight in flights]
-    aligned = align(
-        np.concatenate([e for e, _ in pairs]), np.concatenate([p for _, p in pairs])
-    )
+    aligned = align(np.concatenate([e for e, _ in pairs]), np.concatenate([p for _, p in pairs]))
     return aligned.R, aligned.t, [e @ aligned.R.T + aligned.t - p for e, p in pairs]
 
 

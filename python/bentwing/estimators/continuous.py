@@ -5,8 +5,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from bentwing.errors import NotEnoughDataError
 from bentwing.control.stall import LOST_AFTER
+from bentwing.errors import NotEnoughDataError
 from bentwing.estimators.beginning import Situation, begin_pass
 from bentwing.estimators.buffer import BatchBuffer
 from bentwing.estimators.core_settings import CoreSettings
@@ -240,8 +240,7 @@ class Continuous:
         return True
 
     def _watch_head(self, current: OdometryPass, end: float) -> None:
-        """Remember the pass when the head comes to stand; when it turns again after long, ask whether
-        what is seen fits what was seen before.
+        """Remember the pass when the head comes to stand; after long, ask whether it found back.
 
         Parameters
         ----------

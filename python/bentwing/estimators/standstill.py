@@ -78,7 +78,9 @@ class SpinWatch:
         numbers = np.floor(times / BIN).astype(np.int64)
         edges = np.flatnonzero(np.diff(numbers)) + 1
         for part, number in zip(
-            np.split(rates, edges), numbers[np.append(0, edges)] if len(numbers) else (), strict=False
+            np.split(rates, edges),
+            numbers[np.append(0, edges)] if len(numbers) else (),
+            strict=False,
         ):
             if self._bin is not None and number != self._bin:
                 self._close(self._bin)

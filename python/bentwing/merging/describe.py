@@ -12,9 +12,7 @@ if TYPE_CHECKING:
     from bentwing.places import Place
 
 
-def describe_parts_of(
-    names: Sequence[str], parts: dict[Part, list[Place]]
-) -> list[dict[str, Any]]:
+def describe_parts_of(names: Sequence[str], parts: dict[Part, list[Place]]) -> list[dict[str, Any]]:
     """Return the segments of the runs with their places."""
     return [
         {

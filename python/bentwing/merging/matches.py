@@ -84,9 +84,7 @@ class Match:
 def parts_of(surveys: Sequence[Survey]) -> dict[Part, list[Place]]:
     """Return the places of each part, in order; parts without places, too."""
     parts: dict[Part, list[Place]] = {
-        Part(r, s): []
-        for r, one in enumerate(surveys)
-        for s in range(len(one.recorded.segments))
+        Part(r, s): [] for r, one in enumerate(surveys) for s in range(len(one.recorded.segments))
     }
     for r, one in enumerate(surveys):
         for place, segment in zip(one.places, one.segments, strict=True):

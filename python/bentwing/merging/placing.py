@@ -207,9 +207,7 @@ class _Graph:
         )
         return links, self.nodes
 
-    def guess(
-        self, matches: Sequence[Match]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def guess(self, matches: Sequence[Match]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return poses of the nodes: parts put together along the best matches, from the first on."""
         parts = list(self._trajectories)
         T_map = {parts[0]: np.eye(4)}

@@ -63,7 +63,9 @@ def open_sources(folders: Sequence[Path]) -> list[Source]:
         If a recording is gone or has changed, or a trajectory cannot be read.
     """
     if len(folders) < 2:
-        msg = f"{len(folders)} run given: merging takes two or more; bentwing merge RUN RUN... -o OUT"
+        msg = (
+            f"{len(folders)} run given: merging takes two or more; bentwing merge RUN RUN... -o OUT"
+        )
         raise UsageError(msg)
     seen: dict[Path, Path] = {}
     for folder in folders:
@@ -125,7 +127,9 @@ def _payload(folder: Path, settings: dict[str, Any]) -> Payload:
     try:
         return Payload.model_validate(settings["payload"])
     except (KeyError, ValidationError) as error:
-        msg = f"{folder}: run.json describes no sensor head that can be used ({error}); map it again"
+        msg = (
+            f"{folder}: run.json describes no sensor head that can be used ({error}); map it again"
+        )
         raise InputError(msg) from error
 
 

@@ -9,17 +9,19 @@ import re
 from html import escape
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from bentwing.report.colours import gradient
 from bentwing.report.picture import encode_png
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
     from bentwing.report.picture import View
 
 INK, FAINT, GRID = "#3c4653", "#6b7684", "#e4e8ed"
 _MOST_POINTS = 1200  # of a path
+_JUMP = 1.0  # m from one drawn point to the next, beyond ten usual steps
 _VIEW_BOX = re.compile(r'viewBox="0 0 (\d+) (\d+)"')
 
 
@@ -71,13 +73,22 @@ def _path(view: View, across: NDArray[np.float64], up: NDArray[np.float64]) -> s
     every = max(len(across) // _MOST_POINTS, 1)
     x = (across[::every] - view.left) / view.pixel
     y = (view.top - up[::every]) / view.pixel
-    points = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y, strict=True))
-    line = f'<polyline points="{points}" fill="none" stroke-linejoin="round" '
+    # Between two runs, or over a break, nobody flew.
+    steps = np.hypot(np.diff(x), np.diff(y)) * view.pixel
+    usual = float(steps.mean()) if len(steps) else 0.0
+    jumps = np.flatnonzero(steps > _JUMP + 10 * usual) + 1
+    pieces = zip(np.split(x, jumps), np.split(y, jumps), strict=True)
+    path = " ".join(_move(*piece) for piece in pieces)
+    line = f'<path d="{path}" fill="none" stroke-linejoin="round" '
     start = f'<circle cx="{x[0]:.1f}" cy="{y[0]:.1f}" r="8" fill="#fff" stroke="#c8331e" stroke-width="4"/>'
     return (
         f'{line}stroke="#fff" stroke-width="7" stroke-opacity=".75"/>'
         f'{line}stroke="#c8331e" stroke-width="3.6"/>{start}'
     )
+
+
+def _move(x: NDArray[np.float64], y: NDArray[np.float64]) -> str:
+    return "M" + "L".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y, strict=True))
 
 
 def _scale_bar(view: View, y: float, text_size: int) -> list[str]:

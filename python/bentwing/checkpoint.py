@@ -36,6 +36,7 @@ _RECORDED = (
     "calibration",
     "loop_closure",
     "localization",
+    "merging",
     "segments",
     "windows",
 )

@@ -3,24 +3,18 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from contextlib import contextmanager, suppress
-from dataclasses import replace
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from bentwing import estimators
+from bentwing import estimators, stages
 from bentwing.checkpoint import Checkpoint
-from bentwing.errors import EstimationError, NotEnoughDataError
-from bentwing.georeference import Georeferenced, GeoreferenceSettings, georeference
-from bentwing.global_registration import Budget, GlobalSettings, close_loops
-from bentwing.localize import Difference, NotInMapError, find_in_map, read_prior_map
-from bentwing.map.chunk import untimed
-from bentwing.map.clean import CleanSettings, clean
-from bentwing.map.project import project
+from bentwing.georeference import GeoreferenceSettings
+from bentwing.global_registration import GlobalSettings
+from bentwing.localize import read_prior_map
+from bentwing.map.clean import CleanSettings
 from bentwing.map.sample import MapSample
-from bentwing.map.thin import thin
-from bentwing.map.writer import open_map, require_format
+from bentwing.map.writer import require_format
 from bentwing.preprocess import RecordingPart
 from bentwing.progress import Progress
 from bentwing.recording import Recording
@@ -33,13 +27,7 @@ from bentwing.run_settings import described_settings, load_payload
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from bentwing.estimators.interface import Estimate, Estimator
     from bentwing.localize import PriorMap
-    from bentwing.map.chunk import MapChunk
-    from bentwing.progress import Stage
     from bentwing.recording import Payload
 
 
@@ -115,19 +103,17 @@ def map_recording(
                 folder.add_inputs([*recording.paths, *described])
                 prior = None if prior_map is None else _prior(Path(prior_map), folder)
                 folder.add_recordings(recording.paths, recording.clock.start_ns)
+            job = stages.Job(run, part, folder, watch, asked, prior)
             checkpoint = Checkpoint(folder)
             done = checkpoint.restore(run) if resume else None
             if done is None:
-                with folder.stage("estimate"), watch.stage("estimate", part.length) as shown:
-                    _estimate(engine, part, shown, folder, run)
+                stages.estimate(job, engine)
                 checkpoint.save("estimate", run)
             if (loop_closure or prior) and done != "loops":
-                _close_loops(run, part, watch, folder, threads=threads, prior=prior)
+                stages.register(job)
                 checkpoint.save("loops", run)
-            with folder.stage("georeference"):
-                placed = _georeference(run, part, folder, asked)
-            with folder.stage("map"), watch.stage("map", part.length) as shown:
-                _write_map(run, part, shown, folder, asked=asked, prior=prior, placed=placed)
+            placed = stages.put_on_earth(job)
+            stages.write_map(job, placed)
             with folder.stage("report"):
                 folder.save()
                 report_run(folder, run, complete=True)
@@ -135,181 +121,10 @@ def map_recording(
     return run
 
 
-def _estimate(
-    engine: Estimator, part: RecordingPart, shown: Stage, folder: RunFolder, run: Run
-) -> None:
-    counts, origin_ns = Counter[str](), part.recording.clock.start_ns
-    try:
-        for batch in part.batches(shown, counts):
-            engine.feed(batch)
-            run.watch(batch)
-        run.estimate = engine.result()
-    except (EstimationError, KeyboardInterrupt):
-        with suppress(EstimationError):  # there may be nothing yet
-            run.estimate = engine.so_far()
-        raise
-    finally:
-        # also of a failure: the trajectory up to there shows where it went wrong
-        folder.record["counts"].update(part.recording.counts + counts)
-        folder.record["warnings"] += part.recording.warnings
-        if run.estimate is not None:
-            folder.add_estimate(run.estimate)
-            folder.write_trajectory("odometry.txt", run.estimate, origin_ns)
-    folder.write_trajectory("trajectory.txt", run.estimate, origin_ns)
-
-
 def _prior(path: Path, folder: RunFolder) -> PriorMap:
-    settings = GlobalSettings()
-    prior = read_prior_map(path, settings.surfels)
+    prior = read_prior_map(path, GlobalSettings().surfels)
     folder.add_inputs([prior.file])
     return prior
-
-
-def _close_loops(
-    run: Run,
-    part: RecordingPart,
-    watch: Progress,
-    folder: RunFolder,
-    *,
-    threads: int | None,
-    prior: PriorMap | None,
-) -> None:
-    if run.estimate is None:
-        return
-    settings = GlobalSettings()
-    budget = Budget.of(part.length, settings)
-    watch.note(f"loops: {budget.sentence()}")
-    estimate, known = run.estimate, None
-    if prior is not None:
-        estimate = _localize(estimate, part, watch, folder, threads=threads, prior=prior)
-        known = prior.surfels_near(estimate.trajectory)
-    with folder.stage("loops"), watch.stage("loops", part.length) as shown:
-        batches = part.batches(shown, Counter())  # what is dropped was counted in the first pass
-        closed = close_loops(
-            estimate,
-            batches,
-            part.payload,
-            settings=settings,
-            budget=budget,
-            known=known,
-            threads=threads,
-        )
-    run.estimate = closed.estimate
-    folder.record["loop_closure"] = closed.record
-    folder.add_estimate(run.estimate)
-    folder.write_trajectory("trajectory.txt", run.estimate, part.recording.clock.start_ns)
-
-
-def _localize(
-    estimate: Estimate,
-    part: RecordingPart,
-    watch: Progress,
-    folder: RunFolder,
-    *,
-    threads: int | None,
-    prior: PriorMap,
-) -> Estimate:
-    with folder.stage("localize"), watch.stage("localize", part.length) as shown:
-        try:
-            found = find_in_map(estimate, part.batches(shown, Counter()), prior, threads=threads)
-        except NotInMapError as error:
-            folder.record["localization"] = error.record
-            raise
-    folder.record["localization"] = found.record
-    return found.estimate
-
-
-def _georeference(
-    run: Run, part: RecordingPart, folder: RunFolder, asked: dict[str, Any]
-) -> Georeferenced | None:
-    """Put the estimate on the Earth; a map that has no place there is still a map."""
-    if run.estimate is None:
-        return None
-    estimate, gnss = run.estimate, part.payload.gnss
-    with Progress().stage("georeference", part.length) as unseen:
-        try:
-            placed = georeference(
-                estimate.trajectory,
-                part.recording.fixes(part.start, part.duration),
-                GeoreferenceSettings(**asked["georeferencing"]),
-                lever_arm=(0.0, 0.0, 0.0) if gnss is None else gnss.lever_arm,
-                segments=estimate.segments,
-                reach=part.payload.lidar.max_range,
-                chunks=lambda: _projected(estimate, part, unseen, asked, {}),
-            )
-        except NotEnoughDataError as error:
-            folder.record["warnings"].append(f"{error}; the map stays in its own frame")
-            return None
-    if placed is not None:
-        folder.record["georeference"] = placed.record
-        folder.record["warnings"] += placed.warnings
-        if placed.trajectory is not estimate.trajectory:
-            run.estimate = replace(estimate, trajectory=placed.trajectory)
-            origin_ns = part.recording.clock.start_ns
-            folder.write_trajectory("trajectory.txt", run.estimate, origin_ns)
-    return placed
-
-
-def _projected(
-    estimate: Estimate,
-    part: RecordingPart,
-    shown: Stage,
-    asked: dict[str, Any],
-    counts: dict[str, int],
-) -> Iterator[MapChunk]:
-    return project(
-        part.batches(shown, Counter()),  # what is dropped was counted in the first pass
-        estimate.trajectory,
-        estimate.calibration,
-        segments=estimate.segments,
-        threads=asked["threads"],
-        counts=counts,
-    )
-
-
-def _write_map(
-    run: Run,
-    part: RecordingPart,
-    shown: Stage,
-    folder: RunFolder,
-    *,
-    asked: dict[str, Any],
-    prior: PriorMap | None,
-    placed: Georeferenced | None,
-) -> None:
-    if run.estimate is None:
-        return
-    counts, map_format = folder.record["counts"], asked["map_format"]
-    chunks = _projected(run.estimate, part, shown, asked, counts)
-    path = folder.file(f"map.{map_format}")
-    chunks = clean(
-        chunks,
-        path,
-        duration=part.length,
-        settings=CleanSettings(**asked["cleaning"]),
-        counts=counts,
-        record=folder.record["map"],
-        threads=asked["threads"],
-    )
-    difference = None
-    if prior is not None:
-        difference = Difference(prior.cloud, run.estimate.trajectory)
-        chunks = difference.watch(chunks)
-    chunks = thin(chunks, asked["map_spacing"], counts)
-    origin_ns = part.recording.clock.start_ns
-    crs_wkt = None if placed is None else placed.crs_wkt
-    with open_map(path, map_format, origin_ns, crs_wkt) as writer:
-        for chunk in run.sample.watch(chunks):
-            if placed is not None:
-                chunk = replace(chunk, points=placed.to_projected(chunk.points))
-            writer.write(chunk)
-    counts["map.written"] = writer.n_points
-    if difference is not None:
-        folder.record["localization"] |= difference.record
-        for name in ("appeared", "disappeared"):
-            points: NDArray[np.float64] = getattr(difference, name)
-            with open_map(folder.file(f"{name}.{map_format}"), map_format, origin_ns) as writer:
-                writer.write(untimed(points))
 
 
 @contextmanager

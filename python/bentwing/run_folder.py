@@ -71,6 +71,7 @@ class RunFolder:
             "loop_closure": None,
             "georeference": None,
             "map": {},
+            "merging": None,
             "segments": [],
             "windows": [],
             "peak_memory_mb": None,

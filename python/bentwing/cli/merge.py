@@ -46,6 +46,6 @@ def merge_command(
 def say_maps(merged: Merged) -> None:
     """Tell the maps, and which runs are in them."""
     if len(merged.maps) > 1:
-        typer.echo(f"the runs have no place in common: {len(merged.maps)} separate maps")
+        typer.echo(f"not all runs have places in common: {len(merged.maps)} separate maps")
     for one in merged.maps:
         typer.echo(f"{one.out}: {', '.join(one.names)}; open {one.out / 'report.html'}")

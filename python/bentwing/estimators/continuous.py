@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from bentwing.control.stall import LOST_AFTER
 from bentwing.errors import NotEnoughDataError
 from bentwing.estimators.beginning import Situation, begin_pass
 from bentwing.estimators.buffer import BatchBuffer
@@ -12,9 +13,12 @@ from bentwing.estimators.core_settings import CoreSettings
 from bentwing.estimators.mount import described_mount
 from bentwing.estimators.odometry_pass import DT, MARGIN, OdometryPass
 from bentwing.estimators.outcome import estimate_of
-from bentwing.estimators.segments import JUDGED, MAX_IMU_GAP, Break, found_again
+from bentwing.estimators.planar import is_plane
+from bentwing.estimators.segments import HEAD, JUDGED, MAX_IMU_GAP, Break, found_again
 from bentwing.estimators.settings import ContinuousSettings
+from bentwing.estimators.standstill import SpinWatch
 from bentwing.estimators.start import Start, find_start, level_start
+from bentwing.recording import LidarBatch
 
 if TYPE_CHECKING:
     from bentwing.estimators.interface import Estimate
@@ -54,6 +58,11 @@ class Continuous:
         self._before: list[OdometryPass] = []
         # The pass as it was at a break, while it is not known whether it can be continued.
         self._bridged: tuple[OdometryPass, Break] | None = None
+        # Whether the lidar is a 2D one, which sees single planes when its head stands still; the pass as
+        # it was when the head came to stand, and since when it stands.
+        self._is_planar: bool | None = None
+        self._spin = SpinWatch(by_encoder=payload.encoder is not None)
+        self._stalled: tuple[OdometryPass, float] | None = None
         self._notes: list[str] = []
 
     def feed(self, batch: Batch) -> None:
@@ -64,6 +73,11 @@ class Continuous:
     def take(self, batch: Batch) -> None:
         """Hold the next batch for `step`."""
         self._buffer.add(batch)
+        if not len(batch.times):
+            return
+        if self._is_planar is None and isinstance(batch, LidarBatch):
+            self._is_planar = is_plane(batch.points)
+        self._spin.add(batch)
 
     def step(self, *, finishing: bool = False) -> OdometryPass | None:
         """Register one window that has become complete; returns its pass, None without any.
@@ -193,6 +207,7 @@ class Continuous:
             if ready - current.end < DT:
                 return self._judge_bridge() or self._bridge(current, broken)
             end = ready
+        self._watch_head(current, end)
         current.step(self._buffer, end)
         self._settle(end)
         return True
@@ -209,7 +224,7 @@ class Continuous:
         if self._bridged is not None and end >= self._bridged[1].stop + JUDGED[1]:
             self._judge_bridge()
         else:
-            needed = end if self._bridged is None else self._bridged[1].start
+            needed = end if self._bridged is None else min(end, self._bridged[1].stop)
             self._buffer.forget(needed - self._sliding.window - 1.0)
 
     def _break_until(self, ready: float) -> Break | None:
@@ -224,11 +239,33 @@ class Continuous:
         self._buffer.pass_over(broken)
         return True
 
+    def _watch_head(self, current: OdometryPass, end: float) -> None:
+        """Remember the pass when the head comes to stand; after long, ask whether it found back.
+
+        Parameters
+        ----------
+        end : s, of the next window; nothing later counts, so that live use and recordings agree
+        """
+        if not self._is_planar or self._bridged is not None:
+            return
+        stalls = self._spin.stalls(end)
+        if not stalls:
+            return
+        start, stop = stalls[-1]
+        is_new = self._stalled is None or self._stalled[1] != start
+        if is_new and (stop is None or stop > current.end):
+            self._stalled = current.snapshot(), start
+        if stop is None or self._stalled is None:
+            return
+        before, self._stalled = self._stalled[0], None
+        if stop - start >= LOST_AFTER:
+            self._bridged = before, Break(HEAD, start, stop)
+
     def _judge_bridge(self) -> bool:
         """Begin anew after the last break if its far side does not fit; returns whether so."""
         if self._bridged is None or self._pass is None:
             return False
-        (before, broken), self._bridged = self._bridged, None
+        (before, broken), self._bridged, self._stalled = self._bridged, None, None
         found = found_again(self._pass.windows, broken)
         self._notes.append(broken.sentence(bridged=found))
         if found:

@@ -43,12 +43,17 @@ def refuse_plane(points: NDArray[np.float64], method: str) -> None:
     NotEnoughDataError
         If all points lie in one plane of the lidar frame, as those of a 2D scanner.
     """
-    if len(points) < 3:
-        return
-    extents = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-    if extents[2] < FLAT * extents[0]:
+    if is_plane(points):
         msg = (
             f"the {len(points)} points of the first scan lie in one plane, those of a 2D lidar: "
             f"{method} cannot register single planes, use --estimator continuous"
         )
         raise NotEnoughDataError(msg)
+
+
+def is_plane(points: NDArray[np.float64]) -> bool:
+    """Whether points (N, 3), m, lidar frame, lie in one plane, as those of a 2D lidar."""
+    if len(points) < 3:
+        return False
+    extents = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    return bool(extents[2] < FLAT * extents[0])

@@ -30,9 +30,18 @@ LOST_INLIERS = 0.03
 RECENT = 0.1
 
 
+HEAD = "head"
+"""In place of a sensor: the head of a 2D lidar stood still."""
+GUESSED = "its place relative to what came before is a guess"
+"""How the sentence about a break ends after which the trajectory begins anew."""
+
+
 @dataclass(frozen=True, slots=True)
 class Break:
-    """A silence of one sensor: its last stamp before and its first stamp after, s."""
+    """A silence of one sensor: its last stamp before and its first stamp after, s.
+
+    Or, for `HEAD`, the time in which it did not turn.
+    """
 
     sensor: str
     start: float
@@ -40,16 +49,20 @@ class Break:
 
     def sentence(self, *, bridged: bool) -> str:
         """Say what happened and what became of it."""
-        what = f"no {self.sensor} data from {self.start:.2f} to {self.stop:.2f} s"
+        span = f"from {self.start:.2f} to {self.stop:.2f} s"
+        what = f"no {self.sensor} data {span}"
+        if self.sensor == HEAD:
+            what = f"the head stood still {span}"
         if bridged:
+            there = "the IMU's and single planes'" if self.sensor == HEAD else "a guess"
             return (
-                f"{what}: the trajectory there is a guess; what was seen before and after fits "
+                f"{what}: the trajectory there is {there}; what was seen before and after fits "
                 "together"
             )
         return (
             f"{what}, and what was seen before and after does not fit together: the trajectory "
             "begins anew there, in the direction of the last motion; what follows is accurate in "
-            "itself, but its place relative to what came before is a guess"
+            f"itself, but {GUESSED}"
         )
 
 
@@ -73,7 +86,8 @@ def found_again(windows: Sequence[dict[str, Any]], silence: Break) -> bool:
     first, last = silence.stop + JUDGED[0], silence.stop + JUDGED[1]
     after = [w["inlier_share"] for w in windows if first <= w["time"] <= last]
     if not before or not after:
-        return False
+        # Too little was seen since a head has turned again to doubt what its planes have told.
+        return silence.sensor == HEAD
     return bool(np.mean(after) > np.median(before) - LOST_INLIERS)
 
 

@@ -210,7 +210,8 @@ def _separate_maps(
         told.append(f"{name} ({', '.join(record['maps'][-1]['runs'])})")
         with RunFolder(folder.path / name, folder.record["settings"]) as own:
             own.record["merging"] = {**record, "maps": record["maps"][-1:]}
-            own.record["inputs"] = folder.record["inputs"]
+            numbers = {part.run for part in group.trajectories}
+            own.add_inputs([p for n in sorted(numbers) for p in found.sources[n].recordings])
             maps.append(_one_map(own, group, found))
     folder.record["warnings"].append(
         "not all of the runs have places in common that could be recognised: they are "
@@ -242,7 +243,7 @@ def _one_map(folder: RunFolder, group: Placed, found: _Found) -> MergedMap:
     run = Run(folder.path)
     with folder.stage("map"):
         write_trajectories(folder, sources, [r.estimate for r in recorded], estimates)
-        write_map(folder, sources, run, estimates, found.options, found.watch)
+        write_map(folder, sources, run, estimates, options=found.options, watch=found.watch)
     run.estimate = Estimate(one_after_the_other(estimates), estimates[0].calibration)
     with folder.stage("report"):
         folder.save()

@@ -91,6 +91,7 @@ def write_map(
     sources: Sequence[Source],
     run: Run,
     estimates: Sequence[Estimate],
+    *,
     options: MapOptions,
     watch: Progress,
 ) -> None:
@@ -135,7 +136,8 @@ def one_after_the_other(estimates: Sequence[Estimate]) -> Trajectory:
 
 def _offsets(estimates: Sequence[Estimate]) -> list[float]:
     """Seconds to add to the times of each run so that they follow each other."""
-    offsets, end = [], 0.0
+    offsets: list[float] = []
+    end = 0.0
     for estimate in estimates:
         times = estimate.trajectory.times
         offsets.append(end - float(times[0]) if offsets else 0.0)

@@ -12,6 +12,7 @@ import numpy as np
 from bentwing.atomic import write_text
 from bentwing.report import sections
 from bentwing.report.calibration import calibration_table
+from bentwing.report.merging import merging_section
 from bentwing.report.plot import Series, line_plot
 from bentwing.report.scene import scene
 from bentwing.report.views import SLAB, draw_views
@@ -52,9 +53,10 @@ def write_report(
         sections.verdict(run_json),
         sections.tiles(run_json, trajectory, points),
         _maps(points, times, trajectory, run_json.get("windows") or []),
+        merging_section(run_json.get("merging")),
         _motion(trajectory, spin),
         _windows(run_json.get("windows") or []),
-        f"<h2>Calibration of the sensor head</h2>{calibration_table(run_json.get('calibration'))}",
+        f"<h2>Calibration of the sensor head</h2>{_calibrations(run_json)}",
         _record(run_json),
     ]
     style = files("bentwing.report").joinpath("style.css").read_text(encoding="utf-8")
@@ -68,6 +70,10 @@ def write_report(
 
 
 def _subject(record: Mapping[str, Any]) -> str:
+    maps = (record.get("merging") or {}).get("maps") or []
+    runs = [str(run) for one in maps for run in one["runs"]]
+    if runs:
+        return f"{', '.join(runs[:3])}{' …' if len(runs) > 3 else ''}"
     names = [str(item["name"]) for item in record.get("inputs") or []]
     recordings = [name for name in names if not name.endswith((".yaml", ".yml"))]
     return ", ".join(recordings[:3]) + (" …" if len(recordings) > 3 else "") or "recording"
@@ -131,6 +137,14 @@ def _windows(windows: Sequence[Mapping[str, Any]]) -> str:
         _figure(line_plot(surfels, "time, s", "surfels"), "Surfels", "pieces of surface seen per window"),
     ]  # fmt: skip
     return f'<h2>Estimate, window by window</h2><div class="grid">{"".join(figures)}</div>'
+
+
+def _calibrations(record: Mapping[str, Any]) -> str:
+    runs = record.get("runs") or []
+    if not runs:
+        return calibration_table(record.get("calibration"))
+    tables = [f"<h3>{escape(r['name'])}</h3>{calibration_table(r['calibration'])}" for r in runs]
+    return "".join(tables)
 
 
 def _record(record: Mapping[str, Any]) -> str:

@@ -9,15 +9,21 @@ import re
 from html import escape
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from bentwing.report.colours import gradient
 from bentwing.report.picture import encode_png
 from bentwing.report.way import draw_way
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from bentwing.report.picture import View
     from bentwing.report.way import Way
 
 INK, FAINT, GRID = "#3c4653", "#6b7684", "#e4e8ed"
+_MOST_POINTS = 1200  # of a path
+_JUMP = 1.0  # m from one drawn point to the next, beyond ten usual steps
 _VIEW_BOX = re.compile(r'viewBox="0 0 (\d+) (\d+)"')
 
 
@@ -63,6 +69,28 @@ def nice_ticks(low: float, high: float, n: int) -> list[float]:
     step = next(m * magnitude for m in (1, 2, 5, 10) if m * magnitude >= raw * 0.999)
     first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
     return [i * step for i in range(first, last + 1)] or [low]
+
+
+def _path(view: View, across: NDArray[np.float64], up: NDArray[np.float64]) -> str:
+    every = max(len(across) // _MOST_POINTS, 1)
+    x = (across[::every] - view.left) / view.pixel
+    y = (view.top - up[::every]) / view.pixel
+    # Between two runs, or over a break, nobody flew.
+    steps = np.hypot(np.diff(x), np.diff(y)) * view.pixel
+    usual = float(steps.mean()) if len(steps) else 0.0
+    jumps = np.flatnonzero(steps > _JUMP + 10 * usual) + 1
+    pieces = zip(np.split(x, jumps), np.split(y, jumps), strict=True)
+    path = " ".join(_move(*piece) for piece in pieces)
+    line = f'<path d="{path}" fill="none" stroke-linejoin="round" '
+    start = f'<circle cx="{x[0]:.1f}" cy="{y[0]:.1f}" r="8" fill="#fff" stroke="#c8331e" stroke-width="4"/>'
+    return (
+        f'{line}stroke="#fff" stroke-width="7" stroke-opacity=".75"/>'
+        f'{line}stroke="#c8331e" stroke-width="3.6"/>{start}'
+    )
+
+
+def _move(x: NDArray[np.float64], y: NDArray[np.float64]) -> str:
+    return "M" + "L".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y, strict=True))
 
 
 def _scale_bar(view: View, y: float, text_size: int) -> list[str]:

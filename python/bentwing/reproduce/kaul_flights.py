@@ -20,8 +20,8 @@ from bentwing.pipeline import map_recording
 from bentwing.preprocess import RecordingPart
 from bentwing.recording import Payload, Recording
 from bentwing.simulate.instruments import TerrestrialErrors, choose_stations, scan, track
-from bentwing.simulate.scenario import Scenario, prepare
 from bentwing.simulate.ros import EPOCH_NS
+from bentwing.simulate.scenario import Scenario, prepare
 from bentwing.simulate.write import write_recording
 from bentwing.trajectory import Trajectory, read_tum
 
@@ -165,9 +165,7 @@ def write_best_map(flown: Flown, assignment: Assignment, truth: Trajectory) -> P
         raise ValueError(msg)
     mount = true["T_imu_lidar"]
     pose = Pose(np.array(mount["translation"]), np.array(mount["quaternion"]))
-    calibration = replace(
-        estimate.calibration, latency=true["latency"], mount=FixedMount(pose)
-    )
+    calibration = replace(estimate.calibration, latency=true["latency"], mount=FixedMount(pose))
     path = flown.files.recording.parent / "best_map.las"
     payload = Payload.load(flown.files.payload)
     with Recording(flown.files.recording, payload) as recording:

@@ -88,7 +88,9 @@ class ProjectedSystem:
             msg = f"EPSG:{epsg} is not known ({error}); give the code of a projected system"
             raise UsageError(msg) from None
         if not crs.is_projected or any(a.unit_conversion_factor != 1.0 for a in crs.axis_info):
-            msg = f"EPSG:{epsg} ({crs.name}) is not projected in metres; give for example a UTM zone"
+            msg = (
+                f"EPSG:{epsg} ({crs.name}) is not projected in metres; give for example a UTM zone"
+            )
             raise UsageError(msg)
         return cls(epsg, crs.name, crs.to_wkt("WKT1_GDAL") or crs.to_wkt())
 
@@ -120,11 +122,11 @@ class ProjectedSystem:
         return _transformed(self.epsg, _GEODETIC, points)
 
     def factors(self, longitude: float, latitude: float) -> tuple[float, float]:
-        """Meridian convergence, deg (from grid north to true north, clockwise), and point scale."""
+        """Meridian convergence, deg (from true north to grid north, clockwise), and point scale."""
         import pyproj
 
         found = pyproj.Proj(self.epsg).get_factors(longitude, latitude)
-        return -float(found.meridian_convergence), float(found.meridional_scale)
+        return float(found.meridian_convergence), float(found.meridional_scale)
 
 
 def _geocentric(places: Array) -> Array:
@@ -138,7 +140,8 @@ def _transformed(source: int, target: int, points: Array) -> Array:
         _solid(source), _solid(target), always_xy=True, only_best=True
     )
     try:
-        columns = transformer.transform(*np.asarray(points, np.float64).T, errcheck=True)
+        x, y, z = np.asarray(points, np.float64).T
+        columns = transformer.transform(x, y, z, errcheck=True)
     except pyproj.exceptions.ProjError as error:
         msg = (
             f"coordinates cannot be taken from EPSG:{source} to EPSG:{target} ({error}); a system "

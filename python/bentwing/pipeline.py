@@ -115,7 +115,7 @@ def map_recording(
             with folder.stage("georeference"):
                 placed = _georeference(run, part, folder, asked)
             with folder.stage("map"), watch.stage("map", part.length) as shown:
-                _write_map(run, part, shown, folder, asked, placed)
+                _write_map(run, part, shown, folder, asked, placed=placed)
             with folder.stage("report"):
                 folder.save()
                 report_run(folder, run, complete=True)
@@ -219,6 +219,7 @@ def _write_map(
     shown: Stage,
     folder: RunFolder,
     asked: dict[str, Any],
+    *,
     placed: Georeferenced | None,
 ) -> None:
     if run.estimate is None:

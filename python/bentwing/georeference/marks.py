@@ -133,7 +133,9 @@ def summary(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
     """Count, root mean square and largest residual by use, m."""
     found: dict[str, Any] = {}
     for use in ("control", "check"):
-        left = [row["residual"] for row in rows if row["use"] == use and row["residual"] is not None]
+        left = [
+            row["residual"] for row in rows if row["use"] == use and row["residual"] is not None
+        ]
         if left:
             squares = float(np.sqrt(np.mean(np.square(left))))
             found[use] = {"n": len(left), "rms": squares, "max": float(np.abs(left).max())}

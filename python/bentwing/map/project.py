@@ -111,9 +111,7 @@ def _lengths(points: NDArray[np.float64]) -> NDArray[np.float32]:
     return lengths.astype(np.float32)
 
 
-def _directions(
-    offsets: NDArray[np.float64], lengths: NDArray[np.float32]
-) -> NDArray[np.float32]:
+def _directions(offsets: NDArray[np.float64], lengths: NDArray[np.float32]) -> NDArray[np.float32]:
     return (offsets / np.maximum(lengths, np.float32(1e-6))[:, None]).astype(np.float32)
 
 

@@ -41,7 +41,7 @@ def places_of_run(folder: Path, settings: PlaceSettings | None = None) -> list[P
     is_las = path.suffix in {".laz", ".las"}
     origin = adjusted_gps_origin(first_ns - round(begin * 1e9)) if is_las else 0.0
     points, times = [], []
-    for part in read_parts(path):
+    for part in read_parts(path, read_record(folder).get("georeference")):
         if part.times is None:
             return describe_run(read_points(path), settings=settings)
         points.append(part.points)

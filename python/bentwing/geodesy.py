@@ -50,7 +50,7 @@ class LevelFrame:
         return np.array([[self.longitude, self.latitude, self.height]])
 
     def _axes(self) -> Array:
-        """Unit vectors east, north and up as rows (3, 3), geocentric."""
+        """Return unit vectors east, north and up as rows (3, 3), geocentric."""
         lon, lat = np.radians([self.longitude, self.latitude])
         (sl, cl), (sp, cp) = ((np.sin(a), np.cos(a)) for a in (lon, lat))
         return np.array([[-sl, cl, 0.0], [-sp * cl, -sp * sl, cp], [cp * cl, cp * sl, sp]])

@@ -176,7 +176,7 @@ def _georeference(
         try:
             placed = georeference(
                 estimate.trajectory,
-                part.recording.fixes(part.start, part.duration),
+                None if gnss is None else part.recording.fixes(part.start, part.duration),
                 GeoreferenceSettings(**asked["georeferencing"]),
                 lever_arm=(0.0, 0.0, 0.0) if gnss is None else gnss.lever_arm,
                 segments=estimate.segments,

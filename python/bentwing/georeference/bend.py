@@ -9,6 +9,7 @@ least-squares problem, with weights that let false fixes go.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -129,7 +130,7 @@ def _stiffness(
     """Rows that hold neighbouring nodes together, and one weak one that makes the rest definite."""
     ways = np.diff(positions, axis=0)
     roots = np.sqrt(np.linalg.norm(ways, axis=1) + STILL)
-    for (_, end), (begin, _) in zip(segments[:-1], segments[1:], strict=True):
+    for (_, end), (begin, _) in pairwise(segments):
         roots[(nodes[:-1] < begin) & (nodes[1:] > end)] *= BROKEN
     k = np.arange(len(ways))
     turn, shift = 1 / (TURN_DRIFT * roots), 1 / (SHIFT_DRIFT * roots)

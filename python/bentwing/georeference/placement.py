@@ -79,7 +79,7 @@ class Positions:
     @property
     def information(self) -> Array:
         """(N, 3, 3) 1/m², what each adds to the others."""
-        return self.share * np.linalg.inv(self.covariances)
+        return np.asarray(self.share * np.linalg.inv(self.covariances), np.float64)
 
 
 def independent_share(times: Array) -> float:

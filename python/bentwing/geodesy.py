@@ -50,7 +50,7 @@ class LevelFrame:
         return np.array([[self.longitude, self.latitude, self.height]])
 
     def _axes(self) -> Array:
-        """Unit vectors east, north and up as rows (3, 3), geocentric."""
+        """Return unit vectors east, north and up as rows (3, 3), geocentric."""
         lon, lat = np.radians([self.longitude, self.latitude])
         (sl, cl), (sp, cp) = ((np.sin(a), np.cos(a)) for a in (lon, lat))
         return np.array([[-sl, cl, 0.0], [-sp * cl, -sp * sl, cp], [cp * cl, cp * sl, sp]])
@@ -122,11 +122,11 @@ class ProjectedSystem:
         return _transformed(self.epsg, _GEODETIC, points)
 
     def factors(self, longitude: float, latitude: float) -> tuple[float, float]:
-        """Meridian convergence, deg (from grid north to true north, clockwise), and point scale."""
+        """Meridian convergence, deg (from true north to grid north, clockwise), and point scale."""
         import pyproj
 
         found = pyproj.Proj(self.epsg).get_factors(longitude, latitude)
-        return -float(found.meridian_convergence), float(found.meridional_scale)
+        return float(found.meridian_convergence), float(found.meridional_scale)
 
 
 def _geocentric(places: Array) -> Array:
@@ -140,7 +140,8 @@ def _transformed(source: int, target: int, points: Array) -> Array:
         _solid(source), _solid(target), always_xy=True, only_best=True
     )
     try:
-        columns = transformer.transform(*np.asarray(points, np.float64).T, errcheck=True)
+        x, y, z = np.asarray(points, np.float64).T
+        columns = transformer.transform(x, y, z, errcheck=True)
     except pyproj.exceptions.ProjError as error:
         msg = (
             f"coordinates cannot be taken from EPSG:{source} to EPSG:{target} ({error}); a system "

@@ -142,7 +142,7 @@ def put_on_earth(job: Job) -> Georeferenced | None:
         try:
             placed = georeference(
                 found.trajectory,
-                part.recording.fixes(part.start, part.duration),
+                None if gnss is None else part.recording.fixes(part.start, part.duration),
                 GeoreferenceSettings(**job.asked["georeferencing"]),
                 lever_arm=(0.0, 0.0, 0.0) if gnss is None else gnss.lever_arm,
                 segments=found.segments,

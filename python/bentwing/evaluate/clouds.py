@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from bentwing.map.read import MapPart, read_parts
 from bentwing.map.sample import MapSample
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -25,6 +25,7 @@ class Cloud:
     Attributes
     ----------
     path : the file
+    georeference : as of `read_parts`, for the map of a run with its trajectory
     origin : (3,) m, whole metres near the first points; all points are given relative to it, so
         that geographic coordinates lose no precision
     n_points, n_not_finite : of which the latter are left out
@@ -32,13 +33,19 @@ class Cloud:
     sample : an even sample of points (K, 3) and times (K,); the times are zero without any
     """
 
-    def __init__(self, path: Path, sample_limit: int = 600_000) -> None:
+    def __init__(
+        self,
+        path: Path,
+        sample_limit: int = 600_000,
+        georeference: Mapping[str, Any] | None = None,
+    ) -> None:
         self.path = path
+        self.georeference = georeference
         self.origin: NDArray[np.float64] = np.zeros(3)
         self.n_points = self.n_not_finite = 0
         self.has_times = True
         self.sample = MapSample(sample_limit)
-        for part in read_parts(path):
+        for part in read_parts(path, georeference):
             self._look_at(part)
         if self.n_points == self.n_not_finite:
             msg = f"{path}: holds no point; give a map with points"
@@ -47,7 +54,7 @@ class Cloud:
 
     def parts(self) -> Iterator[NDArray[np.float64]]:
         """Yield finite points `(N, 3)` m, relative to the origin."""
-        for part in read_parts(self.path):
+        for part in read_parts(self.path, self.georeference):
             points = part.points[np.isfinite(part.points).all(axis=1)]
             if len(points):
                 yield points - self.origin

@@ -103,7 +103,7 @@ def evaluate(
     if subject.map_path is None:
         return result
     with progress.stage("reading the map"):
-        cloud = Cloud(subject.map_path)
+        cloud = Cloud(subject.map_path, georeference=subject.georeference)
     if cloud.n_not_finite:
         result.notes.append(
             f"{cloud.n_not_finite} of {cloud.n_points} points of the map are not finite and left out"

@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from bentwing.errors import UsageError
 from bentwing.map.read import MAP_SUFFIXES
@@ -21,11 +22,13 @@ class Subject:
     ----------
     trajectory, odometry : TUM, closed-loop and open-loop
     map_path : a cloud
+    georeference : where a run has put its map on the Earth
     """
 
     trajectory: Path | None
     odometry: Path | None
     map_path: Path | None
+    georeference: dict[str, Any] | None = None
 
     def files(self) -> list[Path]:
         """Return those that exist."""
@@ -46,7 +49,8 @@ def find_subject(path: Path) -> Subject:
     maps = [path / f"map{suffix}" for suffix in MAP_SUFFIXES]
     poses = [path / "trajectory.txt", path / "odometry.txt"]
     trajectory, odometry = (file if file.is_file() else None for file in poses)
-    found = Subject(trajectory, odometry, next((file for file in maps if file.is_file()), None))
+    map_path = next((file for file in maps if file.is_file()), None)
+    found = Subject(trajectory, odometry, map_path, _georeference(path / "run.json"))
     if not found.files():
         what = "has neither trajectory.txt nor map.laz" if path.is_dir() else "does not exist"
         msg = (
@@ -55,3 +59,11 @@ def find_subject(path: Path) -> Subject:
         )
         raise UsageError(msg)
     return found
+
+
+def _georeference(record: Path) -> dict[str, Any] | None:
+    try:
+        found = json.loads(record.read_text(encoding="utf-8")).get("georeference")
+    except (OSError, ValueError, AttributeError):
+        return None
+    return found if isinstance(found, dict) else None

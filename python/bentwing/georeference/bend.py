@@ -9,6 +9,7 @@ least-squares problem, with weights that let false fixes go.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -35,8 +36,6 @@ SHIFT_DRIFT = 0.003  # m/√m
 TURN_DRIFT = 2e-4  # rad/√m
 STILL = 0.05  # m, added to the way: a carrier that hovers drifts too
 BROKEN = 100.0  # factor of the drift over a break of the trajectory
-# Errors of fixes last; more often than this they say nothing new, s.
-INDEPENDENT = 5.0
 _ITERATIONS = 12
 
 
@@ -60,13 +59,10 @@ class Observations:
     doubtful: NDArray[np.bool_]
 
 
-def of_fixes(times: Array, levers: Array, positions: Positions, targets: Array) -> Observations:
-    """Return fixes as observations; `targets` (N, 3) are their places in the map."""
-    spacing = float(np.median(np.diff(times))) if len(times) > 1 else INDEPENDENT
-    share = min(1.0, spacing / INDEPENDENT)
-    weights = share * np.linalg.inv(positions.covariances)
-    gaps = targets - positions.points
-    return Observations(times, levers, gaps, weights, np.ones(len(times), np.bool_))
+def of_fixes(times: Array, levers: Array, positions: Positions) -> Observations:
+    """Return fixes as observations; all of `positions` is in the frame of the map."""
+    gaps = positions.targets - positions.points
+    return Observations(times, levers, gaps, positions.information, np.ones(len(times), np.bool_))
 
 
 def of_surfaces(times: Array, levers: Array, surfaces: Surfaces, targets: Array) -> Observations:
@@ -112,7 +108,8 @@ def _solve(
     """Turn about the vertical and shift `(K, 4)` of every node."""
     stiff = _stiffness(nodes, positions, segments)
     rows = _rows(nodes, seen)
-    factors = np.linalg.cholesky(seen.weights + 1e-12 * np.eye(3)).transpose(0, 2, 1)
+    values, vectors = np.linalg.eigh(seen.weights)  # those of surfaces are of rank one
+    factors = np.sqrt(np.maximum(values, 0.0))[..., None] * vectors.transpose(0, 2, 1)
     gaps = np.einsum("nij,nj->ni", factors, seen.gaps)
     trust = np.ones(len(seen.times))
     solution = np.zeros(4 * len(nodes))
@@ -133,7 +130,7 @@ def _stiffness(
     """Rows that hold neighbouring nodes together, and one weak one that makes the rest definite."""
     ways = np.diff(positions, axis=0)
     roots = np.sqrt(np.linalg.norm(ways, axis=1) + STILL)
-    for (_, end), (begin, _) in zip(segments[:-1], segments[1:], strict=True):
+    for (_, end), (begin, _) in pairwise(segments):
         roots[(nodes[:-1] < begin) & (nodes[1:] > end)] *= BROKEN
     k = np.arange(len(ways))
     turn, shift = 1 / (TURN_DRIFT * roots), 1 / (SHIFT_DRIFT * roots)

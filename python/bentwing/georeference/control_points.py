@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 MIN_POINTS = 20
 MAX_POINTS = 40_000  # of one mark in memory
-MIN_SPREAD = 0.15  # of the radius, across: points of one scan line have no normal
+MIN_SPREAD = 0.1  # of the radius, across: points of one scan line have no normal
 MIN_SIGMA = 0.003  # m; marks are not surveyed better
 _TRIMMED = 3.0
 _COLUMNS = ("id", "x", "y", "z", "radius")
@@ -171,7 +171,10 @@ def plane_around(
     slack : m, by which the mark may be off along the normal
     """
     gaps = points - mark
-    near = np.linalg.norm(gaps, axis=1) < radius + slack
+    lengths = np.linalg.norm(gaps, axis=1)
+    near = lengths < radius
+    if np.count_nonzero(near) < MIN_POINTS:
+        near = lengths < radius + slack
     for _ in range(4):
         if np.count_nonzero(near) < MIN_POINTS:
             return None
@@ -185,7 +188,7 @@ def plane_around(
         limit = max(_TRIMMED * thickness, 0.01)
         near = (np.linalg.norm(across, axis=1) < radius) & (np.abs(heights) < limit)
     n = int(np.count_nonzero(near))
-    if n < MIN_POINTS or np.sqrt(max(values[1], 0.0)) < MIN_SPREAD * radius:
+    if n < MIN_POINTS or np.sqrt(max(values[1], 0.0)) < max(MIN_SPREAD * radius, 3 * thickness):
         return None
     chosen = points[near]
     middle = chosen.mean(axis=0)

@@ -8,14 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bentwing import geometry
-from bentwing.errors import NotEnoughDataError, UsageError
-from bentwing.geodesy import LevelFrame, ProjectedSystem
-from bentwing.georeference.bend import bend, of_fixes, of_surfaces
+from bentwing.geodesy import ProjectedSystem
 from bentwing.georeference.control_points import read_control_points
 from bentwing.georeference.marks import Marks, summary
-from bentwing.georeference.placement import Placement, Positions, Surfaces, place
+from bentwing.georeference.placement import (
+    Placement,
+    place,
+)
 from bentwing.georeference.projection import MapProjection
+from bentwing.georeference.site import Site
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -29,8 +30,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-MAX_HEADING_STD = np.radians(3.0)  # worse than a compass: the map would point anywhere
-_SLACK = (0.3, 3.0)  # m, least and most by which a mark is looked for beside its place
+DOUBTFUL_HEADING_STD = np.radians(1.0)  # half a metre at the end of a lidar's reach
 _MEASURED = 5  # times that surfaces are found anew
 _BENT = 2
 
@@ -100,7 +100,7 @@ def georeference(
     if settings.mode == "off" or (fixes is None and not listed):
         return None
     system = None if settings.epsg is None else ProjectedSystem.of_epsg(settings.epsg)
-    site = _Site.of(trajectory, fixes, segments, lever_arm, system)
+    site = Site.of(trajectory, fixes, segments, lever_arm, system)
     placement, used = site.first_placement()
     marks: Marks | None = None
     before: list[float | None] = []
@@ -118,167 +118,65 @@ def georeference(
     if settings.mode == "constraints":
         for _ in range(_BENT):
             bent = site.bent(bent, placement, used, marks)
-    return site.finished(bent, placement, used, reach, marks, before, settings)
+    return _finished(
+        site,
+        bent,
+        placement,
+        used=used,
+        reach=reach,
+        marks=marks,
+        before=before,
+        mode=settings.mode,
+    )
 
 
-@dataclass(frozen=True, slots=True)
-class _Site:
-    """Fixes and trajectory, before the map has a place."""
-
-    original: Trajectory
-    times: Array
-    levers: Array
-    positions: Positions
-    frame: LevelFrame | None
-    system: ProjectedSystem | None
-    counts: dict[str, int]
-    segments: Sequence[tuple[float, float]]
-
-    @classmethod
-    def of(
-        cls,
-        trajectory: Trajectory,
-        fixes: Fixes | None,
-        segments: Sequence[tuple[float, float]],
-        lever_arm: Sequence[float],
-        system: ProjectedSystem | None,
-    ) -> _Site:
-        empty = np.empty((0, 3))
-        if fixes is None:
-            positions = Positions(empty, empty, np.empty((0, 3, 3)))
-            return cls(trajectory, np.empty(0), empty, positions, None, system, {}, segments)
-        covered = trajectory.covers(fixes.times)
-        if segments:
-            covered &= np.any(
-                [(fixes.times >= a) & (fixes.times <= b) for a, b in segments], axis=0
+def _finished(
+    site: Site,
+    trajectory: Trajectory,
+    placement: Placement,
+    *,
+    used: NDArray[np.bool_],
+    reach: float,
+    marks: Marks | None,
+    before: Sequence[float | None],
+    mode: str,
+) -> Georeferenced:
+    projection: MapProjection | None = None
+    record: dict[str, Any] = {"mode": mode}
+    if site.frame is not None and site.system is not None:
+        low = trajectory.positions.min(axis=0) - reach
+        high = trajectory.positions.max(axis=0) + reach
+        projection = MapProjection.over(low, high, site.frame, placement, site.system)
+        record |= projection.record()
+        gaps = placement.to_level(site.antenna(trajectory)[0]) - site.positions.targets
+        kept = gaps[used]
+        record["fixes"] = {
+            **site.counts,
+            "used": int(np.count_nonzero(used)),
+            "rejected": int(np.count_nonzero(~used)),
+            "rms_horizontal": float(np.sqrt(np.mean(np.sum(kept[:, :2] ** 2, axis=1)))),
+            "rms_vertical": float(np.sqrt(np.mean(kept[:, 2] ** 2))),
+        }
+    else:
+        zero = np.zeros(3)
+        linear = {"map": zero, "projected": placement.translation, "matrix": placement.rotation}
+        record |= {"heading": placement.heading, "linear": linear}
+    warnings = []
+    if placement.std[0] > DOUBTFUL_HEADING_STD:
+        warnings.append(
+            f"the heading of the map on the Earth is known to {np.degrees(placement.std[0]):.1f}° "
+            "only: fly a longer way, or give control points"
+        )
+    if marks is not None:
+        rows = marks.table(placement, before)
+        record["control_points"], record["residuals"] = rows, summary(rows)
+        missing = [row["id"] for row in rows if row["residual"] is None]
+        if missing:
+            warnings.append(
+                f"no flat surface was found within the radius of {', '.join(missing)}: these "
+                "control points are not used"
             )
-        times, places = fixes.times[covered], fixes.places[covered]
-        if len(times) < 2:
-            msg = (
-                f"{len(times)} of {fixes.counts['messages']} GNSS messages are fixes during the "
-                "trajectory; at least 2 are needed"
-            )
-            raise NotEnoughDataError(msg)
-        frame = LevelFrame(*(float(value) for value in np.median(places, axis=0)))
-        system = system or ProjectedSystem.utm(frame.longitude, frame.latitude)
-        p, q = trajectory.interpolate(times)
-        levers = geometry.rotate(q, np.broadcast_to(np.asarray(lever_arm, float), p.shape))
-        positions = Positions(p + levers, frame.from_geodetic(places), fixes.covariances[covered])
-        counts = dict(fixes.counts)
-        return cls(trajectory, times, levers, positions, frame, system, counts, segments)
-
-    def first_placement(self) -> tuple[Placement, NDArray[np.bool_]]:
-        if self.frame is None:
-            return Placement(0.0, np.zeros(3), np.zeros(4)), np.empty(0, np.bool_)
-        placement, used = place(self.positions, Surfaces.none())
-        if placement.std[0] > MAX_HEADING_STD:
-            msg = (
-                f"the GNSS fixes give the heading of the map to {np.degrees(placement.std[0]):.1f}° "
-                "only: the way is too short for their noise"
-            )
-            raise NotEnoughDataError(msg)
-        return placement, used
-
-    def slack(self) -> float:
-        if not len(self.times):
-            return _SLACK[0]
-        variances = np.diagonal(self.positions.covariances, axis1=1, axis2=2)
-        return float(np.clip(3 * np.sqrt(np.median(variances.max(axis=1))), *_SLACK))
-
-    def targets_of(self, coordinates: Array) -> Array:
-        """East, north, up (K, 3) of coordinates in the projected system."""
-        if self.frame is None or self.system is None:
-            return coordinates
-        targets = self.frame.from_geodetic(self.system.to_geodetic(coordinates))
-        far = float(np.linalg.norm(targets, axis=1).max())
-        if not far < 1e5:
-            msg = (
-                f"a control point is {far / 1000:.0f} km from the GNSS fixes; its coordinates are "
-                f"taken as easting, northing and height in EPSG:{self.system.epsg}; give the "
-                "system they are in with --epsg"
-            )
-            raise UsageError(msg)
-        return targets
-
-    def bent(
-        self,
-        trajectory: Trajectory,
-        placement: Placement,
-        used: NDArray[np.bool_],
-        marks: Marks | None,
-    ) -> Trajectory:
-        observations = []
-        if used.any():
-            antenna, levers = self._antenna(trajectory)
-            positions = Positions(
-                antenna[used], self.positions.targets[used], self.positions.covariances[used]
-            )
-            targets = placement.to_map(positions.targets)
-            turned = np.einsum(
-                "ji,njk,kl->nil", placement.rotation, positions.covariances, placement.rotation
-            )
-            local = Positions(positions.points, positions.targets, turned)
-            observations.append(of_fixes(self.times[used], levers[used], local, targets))
-        if marks is not None:
-            surfaces, times = marks.surfaces()
-            if len(times):
-                levers = surfaces.points - trajectory.interpolate(times)[0]
-                targets = placement.to_map(surfaces.targets)
-                observations.append(of_surfaces(times, levers, surfaces, targets))
-        if not observations:
-            return trajectory
-        after = bend(trajectory, observations, self.segments)
-        if marks is not None:
-            marks.follow(trajectory, after)
-            marks.measure(placement, 0.1)
-        return after
-
-    def _antenna(self, trajectory: Trajectory) -> tuple[Array, Array]:
-        """Antenna positions and lever arms (N, 3) m on another trajectory."""
-        p, q = trajectory.interpolate(self.times)
-        _, first = self.original.interpolate(self.times)
-        turn = geometry.multiply(q, geometry.inverse(first))
-        levers = geometry.rotate(turn, self.levers)
-        return p + levers, levers
-
-    def finished(
-        self,
-        trajectory: Trajectory,
-        placement: Placement,
-        used: NDArray[np.bool_],
-        reach: float,
-        marks: Marks | None,
-        before: Sequence[float | None],
-        settings: GeoreferenceSettings,
-    ) -> Georeferenced:
-        projection, record = None, {"mode": settings.mode}
-        if self.frame is not None and self.system is not None:
-            low = trajectory.positions.min(axis=0) - reach
-            high = trajectory.positions.max(axis=0) + reach
-            projection = MapProjection.over(low, high, self.frame, placement, self.system)
-            record |= projection.record()
-            gaps = placement.to_level(self._antenna(trajectory)[0]) - self.positions.targets
-            kept = gaps[used]
-            record["fixes"] = {
-                **self.counts,
-                "used": int(np.count_nonzero(used)),
-                "rejected": int(np.count_nonzero(~used)),
-                "rms_horizontal": float(np.sqrt(np.mean(np.sum(kept[:, :2] ** 2, axis=1)))),
-                "rms_vertical": float(np.sqrt(np.mean(kept[:, 2] ** 2))),
-            }
-        else:
-            record |= {"heading": placement.heading, "translation": placement.translation}
-        warnings = []
-        if marks is not None:
-            rows = marks.table(placement, before)
-            record["control_points"], record["residuals"] = rows, summary(rows)
-            missing = [row["id"] for row in rows if row["residual"] is None]
-            if missing:
-                warnings.append(
-                    f"no flat surface was found within the radius of {', '.join(missing)}: these "
-                    "control points are not used"
-                )
-        if trajectory is not self.original:
-            moved = np.linalg.norm(trajectory.positions - self.original.positions, axis=1)
-            record["bent_by"] = float(moved.max())
-        return Georeferenced(trajectory, projection, placement, record, warnings)
+    if trajectory is not site.original:
+        moved = np.linalg.norm(trajectory.positions - site.original.positions, axis=1)
+        record["bent_by"] = float(moved.max())
+    return Georeferenced(trajectory, projection, placement, record, warnings)

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 GATE = 16.27  # of three squared residuals in units of their noise; 0.1 % are beyond
+# Errors of fixes last: those within so many seconds are worth one.
+INDEPENDENT = 20.0
 _MEDIAN = 2.366  # of the same
 _N_PAIRS = 300
 _ITERATIONS = 30
@@ -53,7 +55,7 @@ class Placement:
 
     def to_map(self, points: Array) -> Array:
         """Map points (N, 3) of east, north, up (N, 3)."""
-        local: Array = (points - self.translation) @ self.rotation
+        local: Array = np.asarray((points - self.translation) @ self.rotation)
         return local
 
 
@@ -65,12 +67,25 @@ class Positions:
     ----------
     points : (N, 3) m, map frame
     targets : (N, 3) m, east, north, up
-    covariances : (N, 3, 3) m²
+    covariances : (N, 3, 3) m², of each
+    share : of its information that each has, where the errors of several are the same
     """
 
     points: Array
     targets: Array
     covariances: Array
+    share: float = 1.0
+
+    @property
+    def information(self) -> Array:
+        """(N, 3, 3) 1/m², what each adds to the others."""
+        return np.asarray(self.share * np.linalg.inv(self.covariances), np.float64)
+
+
+def independent_share(times: Array) -> float:
+    """Return how much of an independent measurement each of many fixes at times (N,) s is."""
+    spacing = float(np.median(np.diff(times))) if len(times) > 1 else INDEPENDENT
+    return min(1.0, spacing / INDEPENDENT)
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,7 +149,7 @@ def place(
             used = squared < GATE * scale
         step, covariance = _step(positions, used, scale, surfaces, found)
         found = Placement(
-            found.heading + float(step[0]),
+            float(np.angle(np.exp(1j * (found.heading + step[0])))),
             found.translation + step[1:],
             np.sqrt(np.diag(covariance)),
         )
@@ -195,7 +210,7 @@ def _step(
         rows = np.zeros((len(points), 3, 4))
         rows[:, :, 0] = np.cross(up, points)
         rows[:, :, 1:] = np.eye(3)
-        weights = np.linalg.inv(positions.covariances[used]) / scale
+        weights = positions.information[used] / scale
         information += np.einsum("nia,nij,njb->ab", rows, weights, rows)
         right -= np.einsum("nia,nij,nj->a", rows, weights, gaps)
     if len(surfaces.sigmas):
@@ -210,5 +225,5 @@ def _step(
     if not np.linalg.cond(information) < 1e12:
         msg = "heading and place of the map do not follow from the GNSS fixes and control points"
         raise NotEnoughDataError(msg)
-    covariance = np.linalg.inv(information)
+    covariance: Array = np.asarray(np.linalg.inv(information), np.float64)
     return covariance @ right, covariance

@@ -14,12 +14,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bentwing.georeference.placement import Placement
-
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bentwing.geodesy import LevelFrame, ProjectedSystem
+    from bentwing.georeference.placement import Placement
 
     Array = NDArray[np.float64]
 
@@ -62,7 +61,7 @@ class MapProjection:
         nodes = _grid(np.cos(np.pi * (np.arange(_NODES) + 0.5) / _NODES))
         points = middle + half * nodes
         exact = system.from_geodetic(frame.to_geodetic(placement.to_level(points)))
-        coefficients = np.linalg.lstsq(_terms(nodes), exact, rcond=None)[0]
+        coefficients = np.asarray(np.linalg.lstsq(_terms(nodes), exact, rcond=None)[0], np.float64)
         made = cls(frame, placement, system, middle, half, coefficients, np.inf)
         between = middle + half * _grid(np.linspace(-1, 1, 6))
         error = float(np.abs(made._polynomial(between) - made.exact(between)).max())

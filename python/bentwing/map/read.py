@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from bentwing.map.read_e57 import e57_scans
 from bentwing.map.read_rows import PART, pcd_rows, ply_rows
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Mapping
 
     from numpy.typing import NDArray
 
@@ -46,8 +46,14 @@ def read_points(path: Path) -> NDArray[np.float64]:
     return np.concatenate(parts) if parts else np.empty((0, 3))
 
 
-def read_parts(path: Path) -> Iterator[MapPart]:
+def read_parts(path: Path, georeference: Mapping[str, Any] | None = None) -> Iterator[MapPart]:
     """Read a .laz, .las, .ply, .pcd or .e57 file in parts that fit into memory.
+
+    Parameters
+    ----------
+    path : the file
+    georeference : what the record of the map's run says about its place on the Earth; the points
+        then come back to the frame of the run's trajectory, to some millimetres in 300 m
 
     Raises
     ------
@@ -61,13 +67,24 @@ def read_parts(path: Path) -> Iterator[MapPart]:
         raise InputError(msg)
     try:
         for points, times in reader(path):
-            yield MapPart(points, times)
+            yield MapPart(_in_map_frame(points, georeference), times)
     except BentwingError:
         raise
     except Exception as error:
         # Parsers of foreign files fail in every way there is; the file is what the user can change.
         msg = f"{path}: not readable as {path.suffix.lower()[1:].upper()} ({error})"
         raise InputError(msg) from error
+
+
+def _in_map_frame(
+    points: NDArray[np.float64], georeference: Mapping[str, Any] | None
+) -> NDArray[np.float64]:
+    if not georeference:
+        return points
+    linear = {name: np.array(value) for name, value in georeference["linear"].items()}
+    inverse = np.linalg.inv(linear["matrix"])
+    local: NDArray[np.float64] = (points - linear["projected"]) @ inverse.T + linear["map"]
+    return local
 
 
 def _las_parts(path: Path) -> Iterator[Table]:

@@ -124,8 +124,10 @@ def _stored(name: str, values: NDArray[Any]) -> NDArray[Any]:
     Such digits would be most of what a compressed point takes.
     """
     if name == "incidence":
-        return np.rint(np.degrees(values) * 8) / 8
-    return np.rint(values * 8192) / 8192 if name == "thickness" else values
+        return np.asarray(np.rint(np.degrees(values) * 8) / 8)
+    if name == "thickness":
+        return np.asarray(np.rint(values * 8192) / 8192)
+    return values
 
 
 def _intensity_scale(first: MapChunk) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from bentwing.run_folder import read_record
 from bentwing.trajectory import Trajectory, read_tum
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
 
     from numpy.typing import NDArray
 
@@ -41,16 +41,17 @@ class RunMap:
     trajectory: Trajectory
     segments: list[tuple[float, float]]
     _origin: float
+    _georeference: Mapping[str, Any] | None
 
     def parts(self) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64] | None]]:
-        """Points (N, 3) m, and their times (N,) on the clock of the trajectory if the map has any.
+        """Points (N, 3) m, map frame, and their times (N,) on the clock of the trajectory if the map has any.
 
         Raises
         ------
         InputError
             If the map cannot be read.
         """
-        for part in read_parts(self.path):
+        for part in read_parts(self.path, self._georeference):
             yield part.points, None if part.times is None else part.times - self._origin
 
 
@@ -65,7 +66,8 @@ def map_of_run(folder: Path) -> RunMap:
         If its trajectory cannot be read.
     """
     folder = Path(folder)
-    segments = [(float(a), float(b)) for a, b in read_record(folder).get("segments") or []]
+    record = read_record(folder)
+    segments = [(float(a), float(b)) for a, b in record.get("segments") or []]
     begin = segments[0][0] if segments else 0.0
     path = next((p for s in MAP_SUFFIXES if (p := folder / f"map{s}").exists()), None)
     if path is None:
@@ -75,7 +77,7 @@ def map_of_run(folder: Path) -> RunMap:
     trajectory = Trajectory(absolute.times + begin, absolute.positions, absolute.quats_xyzw)
     is_las = path.suffix in {".laz", ".las"}
     origin = adjusted_gps_origin(first_ns - round(begin * 1e9)) if is_las else 0.0
-    return RunMap(path, trajectory, segments, origin)
+    return RunMap(path, trajectory, segments, origin, record.get("georeference"))
 
 
 def places_of_run(folder: Path, settings: PlaceSettings | None = None) -> list[Place]:

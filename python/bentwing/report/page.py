@@ -54,6 +54,7 @@ def write_report(
         sections.tiles(run_json, trajectory, points),
         _maps(points, times, trajectory, run_json.get("windows") or []),
         merging_section(run_json.get("merging")),
+        _georeference(run_json.get("georeference")),
         _motion(trajectory, spin),
         _windows(run_json.get("windows") or []),
         f"<h2>Calibration of the sensor head</h2>{_calibrations(run_json)}",
@@ -145,6 +146,29 @@ def _calibrations(record: Mapping[str, Any]) -> str:
         return calibration_table(record.get("calibration"))
     tables = [f"<h3>{escape(r['name'])}</h3>{calibration_table(r['calibration'])}" for r in runs]
     return "".join(tables)
+
+
+def _georeference(found: Mapping[str, Any] | None) -> str:
+    if not found:
+        return ""
+    named = {k: found[k] for k in ("epsg", "crs", "heights", "mode") if k in found}
+    facts: dict[str, Any] = {**named}
+    if "heading" in found:
+        facts["heading, ° north of east"] = np.degrees(found["heading"])
+    if "std" in found:
+        facts["its standard deviation, °"] = np.degrees(found["std"]["heading"])
+        facts["standard deviation of the place, m"] = list(found["std"]["translation"])
+        facts["meridian convergence, °"] = found["convergence_deg"]
+        facts["point scale"] = found["point_scale"]
+    facts |= {f"fixes {name.replace('_', ' ')}": n for name, n in found.get("fixes", {}).items()}
+    if "bent_by" in found:
+        facts["trajectory bent by at most, m"] = found["bent_by"]
+    cells = f"<div>{sections.mapping_table(('what', 'value'), facts)}</div>"
+    if found.get("control_points"):
+        rows = sections.residuals_table(found["control_points"])
+        left = sections.mapping_table(("control points", "m"), found.get("residuals") or {})
+        cells += f"<div><h3>Control points</h3>{rows}{left}</div>"
+    return f'<h2>Place on the Earth</h2><div class="grid">{cells}</div>'
 
 
 def _record(record: Mapping[str, Any]) -> str:

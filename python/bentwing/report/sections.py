@@ -117,6 +117,34 @@ def timings_table(timings: Mapping[str, float]) -> str:
     return table(("stage", "seconds"), rows, numbers=frozenset({1}))
 
 
+def residuals_table(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Make the table of control points: distance of the surface around each, along its normal."""
+
+    def millimetres(value: float | None) -> str:
+        return DASH if value is None else f"{1000 * value:+.1f}"
+
+    cells = [
+        (
+            str(row["id"]),
+            str(row["use"]),
+            f"{row['points']:,}",
+            DASH if row["normal"] is None else ", ".join(f"{n:+.2f}" for n in row["normal"]),
+            millimetres(row["before"]),
+            millimetres(row["residual"]),
+        )
+        for row in rows
+    ]
+    head = (
+        "mark",
+        "use",
+        "points",
+        "normal (east, north, up)",
+        "by GNSS alone, mm",
+        "residual, mm",
+    )
+    return table(head, cells, numbers=frozenset({2, 4, 5}))
+
+
 def inputs_table(inputs: Sequence[Mapping[str, Any]]) -> str:
     """Make the table of input files with their hashes."""
     rows = [

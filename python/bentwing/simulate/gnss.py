@@ -72,8 +72,10 @@ class Receiver:
         white, wander = (np.array([t[self.kind][i] for i in (0, 0, 1)]) for t in (_WHITE, _WANDER))
         covariance = np.diag(white**2 + wander**2).ravel()
         return [
-            FixRecord(float(time), float(time) + 0.08, *place, covariance)
-            for time, place in zip(times, places.tolist(), strict=True)
+            FixRecord(time, time + 0.08, longitude, latitude, height, covariance)
+            for time, (longitude, latitude, height) in zip(
+                times.tolist(), places.tolist(), strict=True
+            )
         ]
 
     def to_level(self, points: Array) -> Array:

@@ -66,7 +66,9 @@ def read_contents(folder: Path, most: int, shown: Stage) -> Contents:
     record = read_record(folder)
     trajectory, origin_ns = _trajectory(folder / "trajectory.txt", record)
     finest = Level(FINEST, most)
-    surfels = surfels_of_cloud(_watched(_map_of(folder), origin_ns, finest, shown), SURFEL_EDGE)
+    surfels = surfels_of_cloud(
+        _watched(_map_of(folder), record, origin_ns, finest, shown), SURFEL_EDGE
+    )
     levels = [finest.result, *coarser_levels(finest.result, _N_COARSER)]
     return Contents(levels, surfels, trajectory, record.get("windows") or [])
 
@@ -88,12 +90,12 @@ def _map_of(folder: Path) -> Path | None:
 
 
 def _watched(
-    path: Path | None, origin_ns: int, level: Level, shown: Stage
+    path: Path | None, record: dict[str, Any], origin_ns: int, level: Level, shown: Stage
 ) -> Iterator[NDArray[np.float64]]:
     """Pass the points of a map on, adding them to a level."""
     if path is None:
         return
-    for part in read_parts(path):
+    for part in read_parts(path, record.get("georeference")):
         times = np.zeros(len(part.points)) if part.times is None else part.times
         if path.suffix in {".laz", ".las"}:
             times = times - adjusted_gps_origin(origin_ns)

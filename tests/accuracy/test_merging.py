@@ -9,7 +9,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from rosbags.rosbag1 import Reader, Writer
 
 from bentwing.errors import InputError, UsageError
 from bentwing.evaluate.trajectory import absolute_error
@@ -133,51 +132,34 @@ def test_a_recording_that_is_gone_or_another_is_named(merged, tmp_path, change, 
 
 
 @pytest.fixture(scope="module")
-def knocked(made_once):
+def stalled(made_once):
     """A flight whose head stalls, and whose IMU is knocked while it stands."""
+    from knock import knocked
+
     from bentwing.cli.main import run_command
 
     scenario = Scenario(scene="office", duration=30.0, seed=32, events=("spin-stall",), stall=6.0)
 
     def fill(folder):
         simulate(scenario, folder)
-        _knock(folder / "recording.bag", folder / "knocked.bag")
+        knocked(folder / "recording.bag", folder / "knocked.bag", KNOCK)
         asked = ["map", folder / "knocked.bag", "--payload", folder / "payload.yaml"]
         assert run_command([*map(str, asked), "-o", str(folder / "run"), "--quiet"]) == 0
 
     return made_once("merging-knocked", fill)
 
 
-def _knock(source, target):
-    from rosbags.typesys import Stores, get_typestore
-
-    store = get_typestore(Stores.ROS1_NOETIC)
-    with Reader(source) as reader, Writer(target) as writer:
-        new = {
-            c.topic: writer.add_connection(c.topic, c.msgtype, typestore=store)
-            for c in reader.connections
-        }
-        for connection, stamp, raw in reader.messages():
-            t = 1e-9 * (stamp - reader.start_time)
-            if connection.topic == "/imu" and KNOCK[0] < t < KNOCK[1]:
-                message = store.deserialize_ros1(raw, connection.msgtype)
-                message.angular_velocity.z += 0.6
-                message.linear_acceleration.x += 2.0
-                raw = store.serialize_ros1(message, connection.msgtype)
-            writer.write(new[connection.topic], stamp, raw)
-
-
-def test_a_flight_is_cut_at_a_stall_and_its_parts_are_merged(knocked):
-    record = json.loads((knocked / "run" / "run.json").read_text())
+def test_a_flight_is_cut_at_a_stall_and_its_parts_are_merged(stalled):
+    record = json.loads((stalled / "run" / "run.json").read_text())
     first, second = record["segments"]
     assert first[1] == pytest.approx(STALL[0], abs=2.0)
     assert second[0] == pytest.approx(STALL[1], abs=1.0)
     (sentence,) = [w for w in record["warnings"] if "the head stood still" in w]
     assert "was found again by" in sentence
     assert record["merging"]["groups"] == [[0, 1]]
-    truth, origin_ns = read_tum(knocked / "truth_trajectory.txt")
-    broken, _ = read_tum(knocked / "run" / "odometry.txt", origin_ns)
-    healed, _ = read_tum(knocked / "run" / "trajectory.txt", origin_ns)
+    truth, origin_ns = read_tum(stalled / "truth_trajectory.txt")
+    broken, _ = read_tum(stalled / "run" / "odometry.txt", origin_ns)
+    healed, _ = read_tum(stalled / "run" / "trajectory.txt", origin_ns)
     seen = truth.within([(8.0, first[1] - 0.1), (second[0] + 1.0, second[1] - 0.1)])
     assert absolute_error(broken, seen).position.rmse > 0.3
     error = absolute_error(healed, seen).position
@@ -186,10 +168,10 @@ def test_a_flight_is_cut_at_a_stall_and_its_parts_are_merged(knocked):
     assert np.isfinite(healed.positions).all()
 
 
-def test_a_long_stall_that_is_survived_is_told_and_not_cut(knocked, tmp_path):
+def test_a_long_stall_that_is_survived_is_told_and_not_cut(stalled, tmp_path):
     out = tmp_path / "out"
     run = map_recording(
-        knocked / "recording.bag", knocked / "payload.yaml", out, loop_closure=False, threads=2
+        stalled / "recording.bag", stalled / "payload.yaml", out, loop_closure=False, threads=2
     )
     assert run.estimate is not None
     assert len(run.estimate.segments) == 1

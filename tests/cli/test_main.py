@@ -96,7 +96,9 @@ def test_wrong_usage_is_one_sentence_and_exit_code_2(capsys, arguments, message)
     assert err.count("\n") == 1
 
 
-def test_options_reach_the_pipeline(called, capsys):
+def test_options_reach_the_pipeline(called, capsys, monkeypatch):
+    # The files do not exist: say that they are the parts of one recording.
+    monkeypatch.setattr("bentwing.recording.flights.flights_of", lambda paths: [paths])
     arguments = [
         "map", "a.mcap", "b.mcap", "--payload", "head.yaml", "-o", "out", "--map-format", "ply",
         "--map-spacing", "0.02", "--no-loop-closure", "--threads", "2", "--start", "5",

@@ -62,7 +62,9 @@ def closed_estimate(
         Trajectory(s.times, np.asarray(n.positions), np.asarray(n.quats_xyzw))
         for s, n in zip(segments, found.samples[own], strict=True)
     ]
-    slow, covariance = found.globals[own][-1], found.covariances[own][-1]
+    # Each segment has found a calibration of its own; the longest one knows it best.
+    best = int(np.argmax([s.times[-1] - s.times[0] for s in moved]))
+    slow, covariance = found.globals[own][best], found.covariances[own][best]
     frozen = np.diag(covariance) == 0.0
     calibration = replace(
         estimate.calibration,

@@ -7,7 +7,8 @@ parts that nothing links are reported as separate.
 
 from __future__ import annotations
 
-from bentwing.merging.runs import Merged, MergedMap, merge, merge_into
+from bentwing.merging.maps import MergedMap
+from bentwing.merging.runs import Merged, merge, merge_into
 from bentwing.merging.source import open_sources
 
 __all__ = ["Merged", "MergedMap", "merge", "merge_into", "open_sources"]

@@ -39,6 +39,7 @@ class Source:
     start, duration : s, the part of the recording that was used; None for all of it
     start_ns : time zero of the recording, ns UTC
     inputs : what run.json says about the files
+    warnings : of the run
     """
 
     name: str
@@ -50,6 +51,7 @@ class Source:
     payload: Payload
     estimate: Estimate
     inputs: list[dict[str, Any]]
+    warnings: list[str]
 
 
 def open_sources(folders: Sequence[Path]) -> list[Source]:
@@ -120,6 +122,7 @@ def open_source(folder: Path, name: str) -> Source:
         _payload(folder, settings),
         _estimate(folder, record),
         record["inputs"],
+        list(record.get("warnings") or []),
     )
 
 

@@ -64,7 +64,9 @@ def read_contents(folder: Path, most: int, shown: Stage) -> Contents:
         If its trajectory or its map cannot be read.
     """
     record = read_record(folder)
-    trajectory, origin_ns = _trajectory(folder / "trajectory.txt", record)
+    # Of a merged map the path of the first run is shown.
+    first = (record.get("runs") or [record])[0]
+    trajectory, origin_ns = _trajectory(folder / first.get("trajectory", "trajectory.txt"), first)
     finest = Level(FINEST, most)
     surfels = surfels_of_cloud(
         _watched(_map_of(folder), record, origin_ns, finest, shown), SURFEL_EDGE

@@ -11,7 +11,7 @@ import typer
 Option = typer.Option
 
 
-def view_command(
+def view_command(  # noqa: PLR0917 - one parameter per option
     run: Annotated[Path, typer.Argument(help="Folder that `bentwing map` has written.")],
     save: Annotated[
         Path | None, Option(help="Write a .rrd file instead of opening it.", show_default=False)

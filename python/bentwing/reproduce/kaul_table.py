@@ -30,7 +30,7 @@ _PAPER_FLIGHTS = {
 
 
 def flight_rows(flown: Flown, measured: Measured) -> list[Compared]:
-    """What was flown, and how long its processing took."""
+    """Tell what was flown, and how long its processing took."""
     name = flown.plan.name
     slow, fast = np.percentile(measured.speeds, [10, 90])
     minutes = flown.duration / 60
@@ -64,7 +64,9 @@ def track_rows(name: str, measured: Measured) -> list[Compared]:
     track = measured.evaluation.trajectory
     if track is None:
         return []
-    axes = ", ".join(f"{_CM * track.axes[a].mean:+.2f} ± {_CM * track.axes[a].std:.2f}" for a in "xyz")
+    axes = ", ".join(
+        f"{_CM * track.axes[a].mean:+.2f} ± {_CM * track.axes[a].std:.2f}" for a in "xyz"
+    )
     line = track.error_over_speed
     slope = "" if line is None else f"{_CM * line.slope:.1f} cm per m/s"
     absolute = measured.absolute
@@ -151,7 +153,9 @@ def drift_numbers(boxes: list[DriftBoxes]) -> dict[str, dict[str, list[float]]]:
     """Percentiles 3, 25, 50, 75 and 97 by length, in mm/m and °/m."""
     units = {"horizontal": _MM, "vertical": _MM, "heading": _DEGREES, "tilt": _DEGREES}
     return {
-        f"{part.length:g} m": {name: _percentiles(getattr(part, name), u) for name, u in units.items()}
+        f"{part.length:g} m": {
+            name: _percentiles(getattr(part, name), u) for name, u in units.items()
+        }
         for part in boxes
     }
 

@@ -3,7 +3,12 @@
 
 from __future__ import annotations
 
-from bentwing.simulate.instruments.terrestrial import Station, TerrestrialErrors, choose_stations, scan
+from bentwing.simulate.instruments.terrestrial import (
+    Station,
+    TerrestrialErrors,
+    choose_stations,
+    scan,
+)
 from bentwing.simulate.instruments.total_station import Sighting, TotalStation, track
 
 __all__ = [

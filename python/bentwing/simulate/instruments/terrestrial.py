@@ -105,8 +105,10 @@ def scan(
         ranges, _ = world.scene.cast(np.ascontiguousarray(origins), rays, errors.max_range)
         hit = np.isfinite(ranges)
         noise = errors.bias + rng.normal(0.0, errors.sigma, np.count_nonzero(hit))
-        yield station.place + station.shift + ((ranges[hit] + noise)[:, None] * rays[hit]) @ (
-            station.turn.T
+        yield (
+            station.place
+            + station.shift
+            + ((ranges[hit] + noise)[:, None] * rays[hit]) @ (station.turn.T)
         )
 
 

@@ -1,37 +1,30 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""Table 2 of Fu 2023: the Kalman filter with a turning lidar, with a fixed one, and with the rotation
-ignored, beside `continuous`; on simulated recordings of the seeds given.
+"""The algorithms of Fu 2023's Table 2 in any scene: the Kalman filter with a turning lidar, with a fixed
+one, and with the rotation ignored, beside `continuous`; on simulated recordings of the seeds given.
 
 Per scene: mean and RMSE of the ATE over all poses, real-time factor and processor seconds of the
-estimate stage (reading included), and whether the errors are as large as stated (NEES).
+estimate stage (reading included), and whether the errors are as large as stated (NEES). The paper's own
+flights are those of `bentwing reproduce fu2023`.
 """
 
 from __future__ import annotations
 
 import argparse
-import resource
 import statistics
 import tempfile
-import time
-from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from scoring import in_flight
 
-from bentwing import estimators
-from bentwing.errors import BentwingError
-from bentwing.estimators.kalman import KalmanSettings
-from bentwing.estimators.settings import ContinuousSettings
 from bentwing.evaluate.nees import levelled_covariances, nees, nees_bounds, pose_errors_since
 from bentwing.evaluate.trajectory import absolute_error
-from bentwing.preprocess import preprocess
-from bentwing.recording import Payload, Recording
+from bentwing.reproduce.campaign import LOST
+from bentwing.reproduce.fu2023 import CONTINUOUS, FIXED, IGNORED, OURS
+from bentwing.reproduce.trials import Trial, attempt
 from bentwing.simulate import Scenario, simulate
-from bentwing.trajectory import read_tum
 
-FAILED = 2.0  # m, of ATE: the estimate has left the way
 COLUMNS = (
     "scene", "algorithm", "runs", "failed", "ATE mean, m", "ATE RMSE, m", "worst, m", "way, m",
     "times real time", "CPU s per s", "NEES pose (end)", "NEES position (end)",
@@ -43,44 +36,34 @@ class Case:
     """An algorithm on a head."""
 
     name: str
-    estimator: str
+    trial: Trial
     head: str
-    settings: object
-    rate: float = 6.2832
 
 
 def cases(rate: float) -> list[Case]:
     """The rows of the table for a motor that turns at `rate`, rad/s."""
     motor = "vlp16-motor"
     return [
-        Case(f"kalman, {rate:g} rad/s", "kalman", motor, KalmanSettings(), rate),
-        Case("R-FAST-LIO: rotation ignored", "kalman", motor, KalmanSettings(rotation="ignored"), rate),
-        Case("F-FAST-LIO: fixed", "kalman", "vlp16-fixed", KalmanSettings()),
-        Case(f"continuous, {rate:g} rad/s", "continuous", motor, ContinuousSettings(), rate),
-    ]  # fmt: skip
+        Case(f"kalman, {rate:g} rad/s", OURS, motor),
+        Case("R-FAST-LIO: rotation ignored", IGNORED, motor),
+        Case("F-FAST-LIO: fixed", FIXED, "vlp16-fixed"),
+        Case(f"continuous, {rate:g} rad/s", CONTINUOUS, motor),
+    ]
 
 
 def run(case: Case, folder: Path, threads: int) -> dict:
     """Estimate a recording and compare it with its truth."""
-    payload = Payload.load(folder / "payload.yaml")
-    engine = estimators.create(case.estimator, payload, case.settings, threads)
-    with Recording(folder / "recording.bag", payload) as recording:
-        truth, _ = read_tum(folder / "truth_trajectory.txt", recording.clock.start_ns)
-        before, began = _processor_seconds(), time.perf_counter()
-        try:
-            for batch in preprocess(recording.batches(), payload, Counter()):
-                engine.feed(batch)
-            estimate = engine.result()
-        except BentwingError as error:
-            return {"failed": True, "why": str(error)}
-        wall, cpu = time.perf_counter() - began, _processor_seconds() - before
-        length = recording.duration
-    error = absolute_error(estimate.trajectory, truth).position
+    tried = attempt(folder, case.trial, threads)
+    if tried.estimate is None:
+        return {"failed": True, "why": tried.why}
+    truth = tried.truth
+    error = absolute_error(tried.estimate.trajectory, truth).position
     way = float(np.linalg.norm(np.diff(truth.positions[::20], axis=0), axis=1).sum())
-    row = {"failed": error.rmse > FAILED, "mean": error.mean, "rmse": error.rmse}
-    row |= {"worst": error.maximum, "way": way, "speed": length / wall, "cpu": cpu / length}
-    if case.estimator == "kalman" and not row["failed"]:
-        row |= consistency(engine, estimate, truth)
+    row = {"failed": error.rmse > LOST, "mean": error.mean, "rmse": error.rmse}
+    speed, cpu = tried.length / tried.seconds, tried.cpu / tried.length
+    row |= {"worst": error.maximum, "way": way, "speed": speed, "cpu": cpu}
+    if case.trial.estimator == "kalman" and not row["failed"]:
+        row |= consistency(tried.engine, tried.estimate, truth)
     return row
 
 
@@ -102,11 +85,6 @@ def consistency(engine, estimate, truth) -> dict:
         "errors": errors[-1],
         "std": np.sqrt(np.diag(doubt[-1])),
     }
-
-
-def _processor_seconds() -> float:
-    usage = resource.getrusage(resource.RUSAGE_SELF)
-    return usage.ru_utime + usage.ru_stime
 
 
 def line(scene: str, case: Case, rows: list[dict]) -> str:

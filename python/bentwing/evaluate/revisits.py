@@ -34,6 +34,7 @@ class Revisits:
     median, p95 : m, of their sizes
     n_patches : pairs of successive visits
     offsets, intervals : (K,) m, and s between the middles of the visits
+    middles : (K,) s, of the later visits
     """
 
     std: float
@@ -42,6 +43,7 @@ class Revisits:
     n_patches: int
     offsets: NDArray[np.float64] = field(metadata=SAMPLES)
     intervals: NDArray[np.float64] = field(metadata=SAMPLES)
+    middles: NDArray[np.float64] = field(metadata=SAMPLES)
 
 
 def revisit_consistency(
@@ -84,6 +86,7 @@ def revisit_consistency(
         len(offsets),
         offsets,
         intervals,
+        middles[later][same],
     )
 
 

@@ -11,6 +11,7 @@ from bentwing.report.svg import FAINT, GRID, nice_ticks, number, text
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+MARK = "#c8412e"
 _LEFT, _RIGHT, _UPPER, _LOWER = 58.0, 12.0, 26.0, 40.0  # margins, pixels
 
 
@@ -45,6 +46,18 @@ class Axes:
         points = " ".join("{:.1f},{:.1f}".format(*self.place(a, b)) for a, b in pairs)
         style = f'fill="none" stroke="{ink}" stroke-width="{width:g}" stroke-linejoin="round"'
         return f'<polyline points="{points}" {style}/>'
+
+    def bands(self, spans: Iterable[tuple[float, float]]) -> list[str]:
+        """Mark stretches of the horizontal axis."""
+        parts = []
+        for first, last in spans:
+            x0, _ = self.place(max(first, self.x_low), self.y_ticks[0])
+            x1, _ = self.place(min(last, self.x_high), self.y_ticks[0])
+            parts.append(
+                f'<rect x="{x0:.1f}" y="{_UPPER}" width="{max(x1 - x0, 1.0):.1f}" '
+                f'height="{self.lower - _UPPER}" fill="{MARK}" fill-opacity=".16"/>'
+            )
+        return parts
 
     def drawn(self) -> list[str]:
         """Draw grid, ticks and numbers."""

@@ -10,11 +10,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bentwing.atomic import write_text
+from bentwing.evaluate.map import wall_thickness
+from bentwing.evaluate.revisits import revisit_consistency
 from bentwing.report import sections
 from bentwing.report.calibration import calibration_table
 from bentwing.report.merging import merging_section
+from bentwing.report.coverage import draw_coverage
+from bentwing.report.loops import closing_table, consistency_table, revisits_table
 from bentwing.report.plot import Series, line_plot
 from bentwing.report.scene import scene
+from bentwing.report.stretches import degenerate_spans, spans_sentence
 from bentwing.report.views import SLAB, draw_views
 
 if TYPE_CHECKING:
@@ -55,6 +60,8 @@ def write_report(
         _maps(points, times, trajectory, run_json.get("windows") or []),
         merging_section(run_json.get("merging")),
         _georeference(run_json.get("georeference")),
+        _coverage(points, times, run_json),
+        _accuracy(points, times, run_json),
         _motion(trajectory, spin),
         _windows(run_json.get("windows") or []),
         f"<h2>Calibration of the sensor head</h2>{_calibrations(run_json)}",
@@ -94,16 +101,58 @@ def _maps(
 ) -> str:
     if not len(points):
         return '<h2>Map</h2><p class="none">No points were mapped.</p>'
-    views = draw_views(points, times, trajectory)
+    views = draw_views(points, times, trajectory, windows)
+    seen = spans_sentence(degenerate_spans(windows))
     figures = [
         scene(points, times, trajectory, windows),
         _figure(views.oblique, "Oblique view", "coloured by height", wide=True),
-        _figure(views.plan_height, "Plan", f"by height, with the path of the sensor (circle: start). {views.plan_note}"),
+        _figure(views.plan_height, "Plan", f"by height, with the path of the sensor (circle: start). {seen} {views.plan_note}"),
         _figure(views.plan_time, "Plan by time", "colours side by side that differ strongly are places seen again later; doubled walls there would be drift."),
         _figure(views.side, "Side view", "along the longer extent of the map", wide=True),
         _figure(views.section, "Section", f"{SLAB:g} m thick, through the middle of the path", wide=True),
     ]  # fmt: skip
     return f'<h2>Map</h2><div class="grid">{"".join(figures)}</div>'
+
+
+def _coverage(
+    points: NDArray[np.float64], times: NDArray[np.float64], record: Mapping[str, Any]
+) -> str:
+    if not len(points):
+        return ""
+    n_points = int((record.get("counts") or {}).get("map.points") or len(points))
+    found = draw_coverage(points, times, n_points)
+    if found is None:
+        return ""
+    density = (
+        f"in squares of {found.cell:.2f} m; {found.median_density:,.0f} points per m² in the median"
+    )
+    visits = (
+        f"of each square, ten seconds apart; of {found.area:,.0f} m² seen from above, "
+        f"{100 * found.share_again:.0f} % were seen more than once"
+    )
+    figures = _figure(found.density, "Density", density) + _figure(found.visits, "Visits", visits)
+    return f'<h2>Coverage</h2><div class="grid">{figures}</div>'
+
+
+def _accuracy(
+    points: NDArray[np.float64], times: NDArray[np.float64], record: Mapping[str, Any]
+) -> str:
+    """Show how well the map agrees with itself: what is known without any reference."""
+    if not len(points):
+        return ""
+    try:
+        walls = wall_thickness(points)
+    except ValueError:
+        walls = None
+    revisits = revisit_consistency(points, times)
+    asked = bool((record.get("settings") or {}).get("loop_closure"))
+    numbers = consistency_table(walls, revisits)
+    closing = closing_table(record.get("loop_closure"), asked=asked)
+    loops = revisits_table(revisits, None if walls is None else walls.median)
+    return (
+        f'<h2>Accuracy, from the map alone</h2><div class="grid"><div>{numbers}</div>'
+        f'<div>{closing}</div><div class="wide"><h3>Loops</h3>{loops}</div></div>'
+    )
 
 
 def _motion(trajectory: Trajectory, spin: Spin | None) -> str:
@@ -126,16 +175,17 @@ def _windows(windows: Sequence[Mapping[str, Any]]) -> str:
     if not windows:
         return ""
     t = _column(windows, "time")
+    spans = degenerate_spans(windows)
     own, fixed = _column(windows, "n_matches"), _column(windows, "n_fixed_matches")
     matches = [Series("in the window", t, own), Series("to fixed views", t, fixed)]
     share = [Series("share", t, 100 * _column(windows, "inlier_share"))]
     residual = [Series("residual", t, _column(windows, "residual_rms"))]
     surfels = [Series("surfels", t, _column(windows, "n_surfels"))]
     figures = [
-        _figure(line_plot(matches, "time, s", "matches"), "Matches", "of surfaces, per window"),
-        _figure(line_plot(share, "time, s", "inliers, %", top=100), "Inliers", "matches that agree"),
-        _figure(line_plot(residual, "time, s", "residual, \N{GREEK SMALL LETTER SIGMA}"), "Residual", "in units of the expected noise; 1 is as expected"),
-        _figure(line_plot(surfels, "time, s", "surfels"), "Surfels", "pieces of surface seen per window"),
+        _figure(line_plot(matches, "time, s", "matches", bands=spans), "Matches", "of surfaces, per window; red where a direction of motion was not seen"),
+        _figure(line_plot(share, "time, s", "inliers, %", top=100, bands=spans), "Inliers", "matches that agree"),
+        _figure(line_plot(residual, "time, s", "residual, \N{GREEK SMALL LETTER SIGMA}", bands=spans), "Residual", "in units of the expected noise; 1 is as expected"),
+        _figure(line_plot(surfels, "time, s", "surfels", bands=spans), "Surfels", "pieces of surface seen per window"),
     ]  # fmt: skip
     return f'<h2>Estimate, window by window</h2><div class="grid">{"".join(figures)}</div>'
 

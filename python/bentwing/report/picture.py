@@ -27,6 +27,7 @@ _DARKEST = np.float32(0.3)  # of ambient light that is left where none comes in
 _RADII = (1, 3)  # pixels over which depth is compared
 _OUTLIERS = 0.1  # percent of the points on each side that may fall off the picture
 _SLACK = 0.25  # of the extent without outliers that they may add on each side
+_FINEST = 1e-4  # m, edge of a pixel at least
 _EFFORT = 1  # of zlib; higher levels take twice the time and save no hundredth of the size
 _THINNED = 100_000  # points that are enough for a percentile
 _NEIGHBOURS = ((0, 1), (1, 0), (0, -1), (-1, 0), (1, 1), (1, -1), (-1, 1), (-1, -1))
@@ -95,6 +96,7 @@ def project(
     width: int = 1100,
     max_height: int = 900,
     close_gaps: int = 3,
+    frame: tuple[float, float, float, float] | None = None,
 ) -> Projection:
     """Find what is seen of points from far away along one direction.
 
@@ -103,9 +105,10 @@ def project(
     across, up, toward : (N,) m, coordinates to the right, upwards and to the viewer
     width, max_height : pixels; the picture gets smaller pixels only as far as both allow
     close_gaps : pixels by which gaps are filled from their edges; it thickens lines as well
+    frame : left, right, bottom and top of the picture, m; default: what holds all but far outliers
     """
-    left, right, bottom, top = _frame(across, up)
-    pixel = max((right - left) / width, (top - bottom) / max_height, 1e-3)
+    left, right, bottom, top = frame or _frame(across, up)
+    pixel = max((right - left) / width, (top - bottom) / max_height, _FINEST)
     shape = (max(int((top - bottom) / pixel), 1) + 1, max(int((right - left) / pixel), 1) + 1)
     front = _front_points(((top - up) / pixel, (across - left) / pixel), toward, shape)
     depth = np.full(shape, -np.inf, np.float32)

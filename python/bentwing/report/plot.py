@@ -39,6 +39,7 @@ def line_plot(
     width: int = 560,
     height: int = 220,
     top: float | None = None,
+    bands: Sequence[tuple[float, float]] = (),
 ) -> str:
     """Plot lines over common axes, of which the vertical one includes zero.
 
@@ -48,6 +49,7 @@ def line_plot(
     x_label, y_label : with unit
     width, height : pixels of the SVG's own coordinates; it scales to its place
     top : upper end of the vertical axis, if it is known
+    bands : stretches of the horizontal axis that are marked
     """
     lines = [line for line in map(_finite, series) if len(line.x)]
     if not lines:
@@ -55,6 +57,7 @@ def line_plot(
     axes = _axes(lines, (width, height), top)
     parts = [
         open_svg(width, height, f"{y_label} over {x_label}"),
+        *axes.bands(bands),
         *axes.drawn(),
         text(axes.right, height - 4, x_label, "end"),
         text(4, 13, y_label, "start"),

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bentwing.report.colours import HEIGHT, TIME
+from bentwing.report.stretches import degenerate
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -99,15 +100,6 @@ def _data(
         "path": _text(np.rint((path - origin) / step).astype("<u2")),
         "unsure": _text(255 * degenerate(path_times, windows).astype(np.uint8)),
     }
-
-
-def degenerate(
-    times: NDArray[np.float64], windows: Sequence[Mapping[str, Any]]
-) -> NDArray[np.bool_]:
-    """Tell which times (N,), s, lie in the new part of a window that left a direction unseen."""
-    ends = np.array([float(w["time"]) for w in windows])
-    flags = np.array([bool(w.get("degenerate")) for w in windows] + [False])
-    return np.asarray(flags[np.searchsorted(ends, times)])
 
 
 def _text(values: NDArray[Any]) -> str:

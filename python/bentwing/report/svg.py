@@ -108,6 +108,8 @@ def _scale_bar(view: View, y: float, text_size: int) -> list[str]:
 def _legend(
     view: View, label: str, table: tuple[str, ...], corner: tuple[float, float], text_size: int
 ) -> list[str]:
+    if len(set(table)) == 1:
+        return []  # one colour shows nothing but the light
     right, y = corner
     identity = f"g{table[0]}"
     stops = "".join(gradient(table))

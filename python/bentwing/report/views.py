@@ -4,20 +4,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bentwing.report.colours import HEIGHT, TIME
 from bentwing.report.picture import paint, project, render
+from bentwing.report.stretches import degenerate
 from bentwing.report.svg import map_view
 from bentwing.report.way import Way
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
     from numpy.typing import NDArray
 
     from bentwing.trajectory import Trajectory
 
+_WAY = ("1f2933", "c8412e")  # seen in all directions, and not
 SLAB = 1.0  # m, thickness of the section
 _HEADROOM = 0.3  # m above the sensor from which on a point counts as overhead
 _NEAR = 2.0  # m beside the sensor within which overhead points tell a roof
@@ -37,7 +41,10 @@ class MapViews:
 
 
 def draw_views(
-    points: NDArray[np.float64], times: NDArray[np.float64], trajectory: Trajectory
+    points: NDArray[np.float64],
+    times: NDArray[np.float64],
+    trajectory: Trajectory,
+    windows: Sequence[Mapping[str, Any]] = (),
 ) -> MapViews:
     """Draw all views of a map.
 
@@ -46,10 +53,13 @@ def draw_views(
     points : (N, 3) float64, m, map frame
     times : (N,) s since the recording's start
     trajectory : of the IMU; drawn over the plan
+    windows : records of the estimate; where one is degenerate the path is red
     """
     overhead = overhead_points(points, times, trajectory)
     along, beside = _directions(points)
     path = trajectory.positions
+    unsure = degenerate(trajectory.times, windows).astype(np.float64)
+    way = Way(path[:, 0], path[:, 1], unsure, _WAY)
     plan, plan_times = points[~overhead], times[~overhead]
     x, y, z = plan.T
     from_above = project(x, y, z, width=800, max_height=800)
@@ -60,9 +70,7 @@ def draw_views(
     note = "Points above the sensor are left out, so that the roof does not hide the floor."
     return MapViews(
         oblique=oblique_view(plan, plan[:, 2], "height, m"),
-        plan_height=map_view(
-            by_height, "height, m", HEIGHT, way=Way(path[:, 0], path[:, 1]), name="Plan"
-        ),
+        plan_height=map_view(by_height, "height, m", HEIGHT, way=way, name="Plan"),
         plan_time=map_view(by_time, "time, s", TIME, name="Plan by time"),
         side=_upright(points, along, beside, "Side view"),
         section=_upright(points[slab], along, beside, "Section"),

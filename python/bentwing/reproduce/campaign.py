@@ -46,9 +46,9 @@ class Result:
     Attributes
     ----------
     trajectory : as estimated; None if the estimator gave up
-    aligned : moved onto the truth as a whole
+    aligned : moved onto the truth as a whole, by its mean place and attitude
     from_start : moved so that the first poses agree
-    distances : (N,) m, from the truth at its stamps `distance_times`
+    distances : (N,) m, from the truth at its stamps `distance_times`, when the positions are aligned
     points : (P, 3) float32, m, some of the returns in the map by `aligned`
     why : the estimator gave up
     windows : records of the estimator
@@ -223,6 +223,16 @@ def fly(
     return Flown(flight, truth, true_points, unturned, results)
 
 
+def as_a_whole(estimate: Trajectory, truth: Trajectory) -> Trajectory:
+    """Move an estimate by mean attitude and place; positions alone leave a turn about a straight way."""
+    found, true = associate(estimate, truth)
+    offsets = geometry.multiply(true.quats_xyzw, geometry.inverse(found.quats_xyzw))
+    turn = geometry.mean_rotation(offsets)
+    middle, aim = found.positions.mean(axis=0), true.positions.mean(axis=0)
+    placed = geometry.rotate(turn, estimate.positions - middle) + aim
+    return Trajectory(estimate.times, placed, geometry.multiply(turn, estimate.quats_xyzw))
+
+
 def with_first_pose(estimate: Trajectory, truth: Trajectory) -> Trajectory:
     """Move an estimate so that its first pose with a truth is the true one."""
     found, true = associate(estimate, truth)
@@ -245,7 +255,7 @@ def _result(tried: Attempt) -> Result:
         except InputError as problem:
             why = str(problem)
         else:
-            aligned = error.alignment.apply(trajectory)
+            aligned = as_a_whole(trajectory, tried.truth)
             from_start = with_first_pose(trajectory, tried.truth)
             times, distances = error.times, error.distances
             found = points_of(tried.lidar, aligned, tried.estimate.calibration)

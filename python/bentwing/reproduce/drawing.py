@@ -31,7 +31,7 @@ _OFF = 0.75  # of the extent of the way: farther outside nothing is drawn
 def positions_over(
     x: Array, truth: Trajectory, found: Mapping[str, Trajectory | None], x_label: str
 ) -> list[str]:
-    """Draw x, y and z of the truth and of estimates in its frame, one drawing each.
+    """Draw x, y and z from the start of the truth on, and of estimates in its frame, one drawing each.
 
     Parameters
     ----------
@@ -42,15 +42,15 @@ def positions_over(
     for axis, name in enumerate("xyz"):
         values = truth.positions[:, axis]
         spare = _OFF * max(float(np.ptp(truth.positions, axis=0).max()), 1.0)
-        lines = [Series("truth", x[::_STEP], values[::_STEP])]
+        lines = [Series("truth", x[::_STEP], values[::_STEP] - values[0])]
         for label, trajectory in found.items():
             if trajectory is not None:
                 there = trajectory.covers(truth.times)
                 y = np.full(len(x), np.nan)
                 y[there] = trajectory.interpolate(truth.times[there])[0][:, axis]
                 y[(y < values.min() - spare) | (y > values.max() + spare)] = np.nan
-                lines.append(Series(label, x[::_STEP], y[::_STEP]))
-        drawings.append(line_plot(lines, x_label, f"{name}, m"))
+                lines.append(Series(label, x[::_STEP], y[::_STEP] - values[0]))
+        drawings.append(line_plot(lines, x_label, f"{name} from the start, m"))
     return drawings
 
 

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from bentwing.simulate.write import SimulatedRecording
 
 N_STATIONS = 6
-_STEP, _QUICK_STEP = np.radians([0.08, 0.25])  # between the beams of the terrestrial scanner
+_STEP, _QUICK_STEP = np.radians([0.08, 0.2])  # between the beams of the terrestrial scanner
 
 _BEST_STEP = 7  # every seventh point is enough for a distribution
 
@@ -48,6 +48,7 @@ class FlightPlan:
     name, scene : of the folder, and of the world
     duration, quick_duration : s
     speed : m/s, at which the length of the way becomes the paper's
+    max_range : m; in daylight the scanner sees hardly farther than 15 m (section 5.1)
     """
 
     name: str
@@ -55,11 +56,12 @@ class FlightPlan:
     duration: float
     quick_duration: float
     speed: float
+    max_range: float
 
 
-COMPOUND = FlightPlan("compound", "compound", 408.0, 45.0, 0.795)
-FOREST = FlightPlan("forest", "forest", 312.0, 40.0, 0.625)
-MINE = FlightPlan("mine", "mine", 120.0, 30.0, 1.0)
+COMPOUND = FlightPlan("compound", "compound", 408.0, 45.0, 0.795, 15.0)
+FOREST = FlightPlan("forest", "forest", 312.0, 40.0, 0.625, 15.0)
+MINE = FlightPlan("mine", "mine", 120.0, 30.0, 1.0, 30.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,6 +98,7 @@ def fly_and_map(plan: FlightPlan, assignment: Assignment) -> Flown:
         seed=assignment.seed,
         spin="plant",
         speed=plan.speed,
+        max_range=plan.max_range,
     )
     folder = assignment.out / plan.name
     # an earlier reproduction is made anew, in case the simulation has changed
@@ -115,10 +118,10 @@ def fly_and_map(plan: FlightPlan, assignment: Assignment) -> Flown:
     return Flown(plan, setup, files, out, run, record)
 
 
-def truth_of(flown: Flown) -> Trajectory:
-    """Return the true poses of the IMU on the clock of the run."""
+def truth_of(flown: Flown) -> tuple[Trajectory, int]:
+    """Return the true poses of the IMU on the clock of the run, and when that begins."""
     with Recording(flown.files.recording, Payload.load(flown.files.payload)) as recording:
-        return read_tum(flown.files.trajectory, recording.clock.start_ns)[0]
+        return read_tum(flown.files.trajectory, recording.clock.start_ns)
 
 
 def write_track(flown: Flown, assignment: Assignment) -> tuple[Path, float]:

@@ -48,6 +48,7 @@ class Measured:
     best_std : m, of the map made with true poses and calibration, against the same reference
     terrestrial : an even sample of the terrestrial cloud, points (K, 3) m and stations (K,)
     n_terrestrial : points of it
+    truth, flight : true poses on the run's clock, and first and last time in the air, s
     way, speeds, heights : m flown, m/s and m over the start, (N,) ten times a second
     """
 
@@ -58,6 +59,8 @@ class Measured:
     best_std: float | None
     terrestrial: tuple[NDArray[np.float64], NDArray[np.float64]] | None
     n_terrestrial: int
+    truth: Trajectory
+    flight: tuple[float, float]
     way: float
     speeds: NDArray[np.float64]
     heights: NDArray[np.float64]
@@ -66,12 +69,11 @@ class Measured:
 def measure(flown: Flown, assignment: Assignment, *, scanned: bool) -> Measured:
     """Track the flight, scan its world if asked to, and compare."""
     progress = assignment.progress
-    truth = truth_of(flown)
+    truth, origin_ns = truth_of(flown)
     track, share = write_track(flown, assignment)
-    estimate, origin_ns = read_tum(flown.folder / "trajectory.txt")
+    estimate = read_tum(flown.folder / "trajectory.txt", origin_ns)[0]
     odometry = read_tum(flown.folder / "odometry.txt", origin_ns)[0]
-    relative = read_tum(flown.files.trajectory, origin_ns)[0]
-    flight = in_flight(relative)
+    flight = in_flight(truth)
     result = Evaluation()
     with progress.stage(f"compare {flown.plan.name}"):
         result.trajectory = compare_with_track(estimate, origin_ns, read_track(track))
@@ -90,16 +92,18 @@ def measure(flown: Flown, assignment: Assignment, *, scanned: bool) -> Measured:
             best = _best_std(Cloud(best_path), reference, truth)
         best_path.unlink()
         sample = Cloud(path, 400_000).sample
-        terrestrial = (sample.points, sample.times)
+        terrestrial = (sample.points, sample.times - sample.times.min())
     way, speeds, heights = _motion(flown, flight)
     return Measured(
         result,
-        drift_boxes(odometry, relative),
-        absolute_error(estimate, relative, during=flight),
+        drift_boxes(odometry, truth),
+        absolute_error(estimate, truth, during=flight),
         share,
         best,
         terrestrial,
         n_terrestrial,
+        truth,
+        flight,
         way,
         speeds,
         heights,

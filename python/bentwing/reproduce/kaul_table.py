@@ -30,7 +30,7 @@ _PAPER_FLIGHTS = {
 
 
 def flight_rows(flown: Flown, measured: Measured) -> list[Compared]:
-    """What was flown, and how long its processing took."""
+    """Tell what was flown, and how long its processing took."""
     name = flown.plan.name
     slow, fast = np.percentile(measured.speeds, [10, 90])
     minutes = flown.duration / 60

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""Kaul 2015, section 4: Figs. 8, 13, 19 to 25, and the accuracy behind them."""
+"""Kaul 2015, section 4: Figs. 3, 8, 13, 19 to 25, and the accuracy behind them."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from bentwing.reproduce.kaul_table import (
     map_rows,
     track_rows,
 )
+from bentwing.reproduce.loop_stages import loop_figures
 from bentwing.reproduce.ranges import range_figure
 
 if TYPE_CHECKING:
@@ -36,16 +37,19 @@ def mapping_part(assignment: Assignment) -> Part:
     forest = fly_and_map(FOREST, assignment)
     measured["forest"] = measure(forest, assignment, scanned=False)
     mine = fly_and_map(MINE, assignment)
+    of_compound = measured["compound"]
+    stages, stage_rows = loop_figures(compound, of_compound.truth, of_compound.flight, assignment)
     with assignment.progress.stage("draw"):
         ranges, range_rows, medians = range_figure(
             {"compound": compound.setup, "forest": forest.setup}, assignment
         )
         drawings = {name: evaluation_drawings(m.evaluation) for name, m in measured.items()}
         figures = [
+            *stages,
             ranges,
             Figure("fig13a", map_oblique(forest, HEIGHT), "Fig. 13a", "Map of the forest, by height."),
             Figure("fig13b", map_from_above(mine), "Fig. 13b", "A mine from above, without its roof, with the flight by time."),
-            *compound_figures(compound, measured["compound"], drawings["compound"]),
+            *compound_figures(compound, of_compound, drawings["compound"]),
             Figure("fig19c", map_oblique(forest), "Fig. 19c", "The forest stands in for the paper's hill with trees and a fence."),
             *_track_figures(drawings),
             *_drift_figures(drawings),
@@ -54,11 +58,12 @@ def mapping_part(assignment: Assignment) -> Part:
     rows = [*range_rows]
     for flown in (compound, forest):
         rows += _rows(flown, measured[flown.plan.name])
+    rows += stage_rows
     numbers: dict[str, Any] = {"range_medians_m": medians}
     numbers |= {name: _numbers(m) for name, m in measured.items()}
     # apart from the rest, because they are the only numbers that two runs do not share
     numbers["timings_s"] = {f.plan.name: f.record["timings"] for f in (compound, forest, mine)}
-    title = "Kaul 2015, mapping: Figs. 8, 13, 19 to 25"
+    title = "Kaul 2015, mapping: Figs. 3, 8, 13, 19 to 25"
     return Part(title, sorted(figures, key=lambda f: f.name), numbers, rows)
 
 

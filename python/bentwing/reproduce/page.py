@@ -48,4 +48,4 @@ def _table(shown: TextTable) -> str:
 def _compared(rows: Sequence[Compared]) -> str:
     head = ("", "paper", "bentwing, simulated", "aim", "")
     cells = [(r.what, r.paper, r.ours, r.aim or DASH, MET[r.met]) for r in rows]
-    return table(head, cells) + "<p></p>"
+    return table(head, cells, numbers=frozenset({3, 4})) + "<p></p>"

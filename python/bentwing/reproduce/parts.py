@@ -77,7 +77,9 @@ def reproduce(
 
 
 def _write(out: Path, name: str, part: Part, written: Reproduced) -> None:
-    for figure in part.figures:
+    # Where there is nothing to draw the page says so in words.
+    drawn = [figure for figure in part.figures if figure.drawing.startswith("<svg")]
+    for figure in drawn:
         path = out / f"{figure.name}.svg"
         write_text(path, standalone(figure.drawing))
         write_bytes(path.with_suffix(".png"), rasterize(figure.drawing))

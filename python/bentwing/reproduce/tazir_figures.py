@@ -56,7 +56,7 @@ def _town_maps(flown: dict[str, Flown]) -> list[Figure]:
             f"Within 40 m of the way {100 * share['turning']:.0f} % of the square metres have a point with the turning "
             f"lidar, {100 * share['fixed']:.0f} % with the fixed one.",
         ),
-        Figure("fig05x", map_from_above(_near(fixed.results["ndt"].points, path), path), "Section 5.2", "What `ndt` makes of the fixed lidar."),
+        Figure("section52", map_from_above(_near(fixed.results["ndt"].points, path), path), "Section 5.2", "What `ndt` makes of the fixed lidar."),
     ]  # fmt: skip
 
 
@@ -85,7 +85,7 @@ def _overlay(blue: NDArray[np.float32], red: NDArray[np.float32]) -> str:
     kind = np.concatenate([np.zeros(len(blue)), np.ones(len(red))])
     seen = project(*cloud.T, width=1000, max_height=800, close_gaps=1)
     view = paint(seen, kind, table=_TWO, span=(0.0, 1.0))
-    return map_view(view, "0: true poses, fixed; 1: odometry, turning", _TWO, name="Both maps")
+    return map_view(view, "true poses, odometry", _TWO, name="Both maps")
 
 
 def _trajectories(flown: dict[str, Flown]) -> list[Figure]:
@@ -168,8 +168,8 @@ def _dam(flown: dict[str, Flown]) -> list[Figure]:
     turning, fixed = flown["dam, 0.5 rad/s"], flown["dam, fixed"]
     path = turning.truth.positions[::50]
     return [
-        Figure("fig15a", oblique_map(_near(turning.results["ndt"].points, path, 150.0), path), "Fig. 15", "The dam, by `ndt` with the turning lidar at 70 m and 4 m/s."),
-        Figure("fig15b", oblique_map(_near(fixed.results["ndt"].points, path, 150.0), path), "Section 5.6.1", "The same with the fixed lidar, of which the paper's odometry made no map."),
+        Figure("fig15", oblique_map(_near(turning.results["ndt"].points, path, 150.0), path), "Fig. 15", "The dam, by `ndt` with the turning lidar at 70 m and 4 m/s."),
+        Figure("section561", oblique_map(_near(fixed.results["ndt"].points, path, 150.0), path), "Section 5.6.1", "The same with the fixed lidar, of which the paper's odometry made no map."),
     ]  # fmt: skip
 
 

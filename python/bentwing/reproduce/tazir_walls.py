@@ -152,6 +152,8 @@ def wall_figures(walls: dict[str, Covered]) -> list[Figure]:
 
 def _drawn(density: Array, name: str) -> str:
     """Draw densities (A, B) on a logarithmic scale, the second axis upwards."""
+    if not density.any():
+        return '<p class="none">No point fell here.</p>'
     seen = density.T[::-1]
     low, high = _DECADES
     with np.errstate(divide="ignore"):
@@ -162,4 +164,4 @@ def _drawn(density: Array, name: str) -> str:
     image[filled] = colour(np.clip(shade, 0.0, 1.0), HEIGHT)
     large = np.ascontiguousarray(np.repeat(np.repeat(image, _PIXELS, axis=0), _PIXELS, axis=1))
     view = View(large, _CELL / _PIXELS, 0.0, 0.0, low, high)
-    return map_view(view, "log10 of points per m²", HEIGHT, name=name)
+    return map_view(view, "log10 points/m²", HEIGHT, name=name, text_size=13)

@@ -66,16 +66,16 @@ def read_contents(folder: Path, most: int, shown: Stage) -> Contents:
     record = read_record(folder)
     # Of a merged map the path of the first run is shown.
     first = (record.get("runs") or [record])[0]
-    trajectory, origin_ns = _trajectory(folder / first.get("trajectory", "trajectory.txt"), first)
+    trajectory, origin_ns = trajectory_of(folder / first.get("trajectory", "trajectory.txt"), first)
     finest = Level(FINEST, most)
     surfels = surfels_of_cloud(
-        _watched(_map_of(folder), record, origin_ns, finest, shown), SURFEL_EDGE
+        _watched(map_of(folder), record, origin_ns, finest, shown), SURFEL_EDGE
     )
     levels = [finest.result, *coarser_levels(finest.result, _N_COARSER)]
     return Contents(levels, surfels, trajectory, record.get("windows") or [])
 
 
-def _trajectory(path: Path, record: dict[str, Any]) -> tuple[Trajectory, int]:
+def trajectory_of(path: Path, record: dict[str, Any]) -> tuple[Trajectory, int]:
     """Return the trajectory and the recording's start, ns."""
     absolute, first_ns = read_tum(path)
     begin = float((record.get("segments") or [[0.0]])[0][0])
@@ -86,7 +86,8 @@ def _trajectory(path: Path, record: dict[str, Any]) -> tuple[Trajectory, int]:
     )
 
 
-def _map_of(folder: Path) -> Path | None:
+def map_of(folder: Path) -> Path | None:
+    """Return the map of a run folder."""
     maps = [folder / f"map{suffix}" for suffix in MAP_SUFFIXES]
     return next((path for path in maps if path.exists()), None)
 

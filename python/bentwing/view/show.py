@@ -11,7 +11,7 @@ import numpy as np
 from bentwing.errors import UsageError
 from bentwing.progress import Progress
 from bentwing.report.colours import HEIGHT, colour
-from bentwing.report.scene import degenerate
+from bentwing.report.stretches import degenerate
 from bentwing.view.contents import MOST_SURFELS, Contents, read_contents
 
 if TYPE_CHECKING:

@@ -96,12 +96,20 @@ def whole_page(tmp_path_factory):
 
 def test_the_page_has_all_parts_and_needs_no_network(whole_page):
     text, page = whole_page
-    for heading in ("Map", "Motion", "Estimate, window by window", "Calibration", "Record"):
+    for heading in (
+        "Map",
+        "Coverage",
+        "Accuracy",
+        "Motion",
+        "Estimate, window by window",
+        "Calibration",
+        "Record",
+    ):
         assert f"<h2>{heading}" in text
-    for part in ("Oblique view", "Plan by time", "Side view", "Section", "Rate of turn",
+    for part in ("Oblique view", "Plan by time", "Density", "Visits", "against control points", "Side view", "Section", "Rate of turn",
                  "Position", "Matches", "Inliers", "Residual", "Surfels", "yard.mcap"):  # fmt: skip
         assert part in text
-    assert page.counts["svg"] == 5 + 3 + 4
+    assert page.counts["svg"] == 5 + 2 + 3 + 4
     assert all(link.startswith("data:image/png;base64,") for link in page.links)
     assert not re.search(r"https?://(?!www\.w3\.org/2000/svg)", text)
     assert "<script src" not in text

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from bentwing.report import scene as rooms
-from bentwing.report.scene import degenerate, scene
+from bentwing.report.scene import scene
+from bentwing.report.stretches import degenerate
 from bentwing.trajectory import Trajectory
 
 WINDOWS = [{"time": t, "degenerate": t == 3.0} for t in (1.0, 2.0, 3.0, 4.0)]

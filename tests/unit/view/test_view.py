@@ -1,11 +1,18 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
 import sys
 
+import laspy
 import numpy as np
 import pytest
 
 from bentwing.errors import UsageError
-from bentwing.view import view_run
+from bentwing.map.chunk import MapChunk
+from bentwing.map.epsg import epsg_of_map
+from bentwing.map.writer import open_map
+from bentwing.progress import Progress
+from bentwing.run_folder import RunFolder
+from bentwing.trajectory import Trajectory
+from bentwing.view import view_run, write_frames, write_pictures
 from bentwing.view.levels import Level, coarser_levels
 
 
@@ -59,3 +66,61 @@ def test_a_folder_that_is_no_run_is_refused(tmp_path):
     pytest.importorskip("rerun", reason="rerun-sdk is not installed")
     with pytest.raises(UsageError, match=r"run\.json"):
         view_run(tmp_path)
+
+
+def run_folder(path, *, wkt=None, shift=(0.0, 0.0, 0.0)):
+    """A run whose map is a box, in local or in projected coordinates."""
+    points, times = box(40_000)
+    way = np.column_stack([np.linspace(1, 5, 100), np.linspace(1, 3, 100), np.full(100, 1.5)])
+    with RunFolder(path) as folder, open_map(folder.file("map.las"), "las", 10**18) as writer:
+        writer.write(MapChunk(points + shift, times, np.ones(len(times), np.float32)))
+        trajectory = Trajectory(
+            np.linspace(0, 9, 100), way + shift, np.tile([0.0, 0, 0, 1], (100, 1))
+        )
+        trajectory.write_tum(folder.file("trajectory.txt"), 10**18)
+    if wkt is not None:
+        las = laspy.read(path / "map.las")
+        las.header.vlrs.append(laspy.vlrs.known.WktCoordinateSystemVlr(wkt))
+        las.write(path / "map.las")
+    return path
+
+
+UTM = 'PROJCRS["UTM 33N",BASEGEOGCRS["WGS 84",ID["EPSG",4326]],ID["EPSG",32633]]'
+
+
+def test_pictures_of_a_local_run_have_no_place_on_earth(tmp_path):
+    run = run_folder(tmp_path / "run")
+    names = {path.name for path in write_pictures(run, tmp_path / "out", Progress())}
+    assert names == {"top.png", "top_time.png", "section_along.png", "section_across.png"}
+    assert {path.name for path in (tmp_path / "out").iterdir()} == names
+
+
+def test_a_georeferenced_run_has_a_geotiff_where_it_lies(tmp_path):
+    corner = np.array([500_000.0, 5_400_000.0, 200.0])
+    run = run_folder(tmp_path / "run", wkt=UTM, shift=corner)
+    written = write_pictures(run, tmp_path / "out", Progress())
+    tiff = next(path for path in written if path.name == "top.tif").read_bytes()
+    numbers = np.frombuffer(tiff[-104:-32])  # in front of the keys: pixel size and corner
+    easting, northing = numbers[6:8]
+    assert easting == pytest.approx(corner[0], abs=0.3)
+    assert northing == pytest.approx(corner[1] + 4.0, abs=0.3)
+
+
+@pytest.mark.parametrize(
+    ("wkt", "epsg"),
+    [
+        (UTM, 32633),
+        ('COMPD_CS["x",PROJCS["y",AUTHORITY["EPSG","25832"]],VERT_CS["z",AUTHORITY["EPSG","5783"]]]', 25832),
+        ('PROJCRS["no code"]', None),
+        (None, None),
+    ],
+)  # fmt: skip
+def test_the_code_of_a_map_is_that_of_its_horizontal_system(tmp_path, wkt, epsg):
+    assert epsg_of_map(run_folder(tmp_path / "run", wkt=wkt) / "map.las") == epsg
+
+
+def test_frames_show_the_map_grow(tmp_path):
+    run = run_folder(tmp_path / "run")
+    frames = write_frames(run, tmp_path / "out", 3, Progress())
+    assert [path.name for path in frames] == [f"frame_000{k}.png" for k in (1, 2, 3)]
+    assert frames[0].stat().st_size < frames[2].stat().st_size

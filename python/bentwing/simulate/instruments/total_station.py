@@ -108,6 +108,7 @@ def _measured(rig: Rig, read_at: Array, place: Array, station: TotalStation) -> 
     elevation = np.arctan2(ways[:, 1, 2], np.hypot(ways[:, 1, 0], ways[:, 1, 1]))
     distance = np.linalg.norm(ways[:, 2], axis=1)
     level = np.cos(elevation) * distance
-    return place + np.column_stack(
+    measured: Array = place + np.column_stack(
         [np.cos(azimuth) * level, np.sin(azimuth) * level, np.sin(elevation) * distance]
     )
+    return measured

@@ -22,7 +22,7 @@ def compound(rng: np.random.Generator) -> Site:
 
 
 def _stores(rng: np.random.Generator, length: float, width: float) -> list[Mesh]:
-    """A shed and shipping containers."""
+    """Place a shed and shipping containers."""
     shed = gable((0.0, 0.0, -0.2), (6.0, 4.0, 3.0), 1.4, 0.3)
     parts = [shed.moved((length - 9.0, width - 7.0, 0.0), rng.uniform(-0.15, 0.15))]
     for x, y in ((0.22, 0.3), (0.28, 0.3), (0.62, 0.22)):

@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""How densely and how often each part of the site was measured, seen from above."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bentwing.report.colours import HEIGHT, TIME, colour
+from bentwing.report.picture import PAPER, View, thinned
+from bentwing.report.svg import map_view
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+_CELLS = 160  # along the longer side of the map
+_FINEST = 0.1  # m, edge of a cell
+_WIDTH = 640  # pixels of the picture, about
+_APART = 10.0  # s without any point in a cell, which divide two visits
+_MOST_VISITS = 8.0  # at the end of the colour map at least this many
+_FEWEST = 3  # sampled points in a cell that count as seen
+
+
+@dataclass(frozen=True, slots=True)
+class Coverage:
+    """Plans of density and visits, and what they say.
+
+    Attributes
+    ----------
+    density, visits : SVG
+    cell : m, edge of the squares that are counted
+    area : m², of the squares that were seen
+    median_density : points per m² of plan, of the squares that were seen
+    share_again : of the area that was seen in more than one visit
+    """
+
+    density: str
+    visits: str
+    cell: float
+    area: float
+    median_density: float
+    share_again: float
+
+
+def draw_coverage(
+    points: NDArray[np.float64], times: NDArray[np.float64], n_points: int
+) -> Coverage | None:
+    """Count points and visits in squares of the plan; None where there is nothing to count.
+
+    Parameters
+    ----------
+    points, times : (N, 3) m and (N,) s, an even sample of the map
+    n_points : of the whole map
+    """
+    low, high = np.percentile(thinned(points[:, :2]), [0.2, 99.8], axis=0)
+    cell = max(_FINEST, float((high - low).max()) / _CELLS)
+    shape = tuple(np.ceil((high - low) / cell).astype(int) + 1)
+    place = np.floor((points[:, :2] - low) / cell).astype(np.int64)
+    inside = ((place >= 0) & (place < shape)).all(axis=1)
+    keys = place[inside, 0] * shape[1] + place[inside, 1]
+    counts = np.bincount(keys, minlength=shape[0] * shape[1]).reshape(shape)
+    seen = counts >= _FEWEST
+    if not seen.any():
+        return None
+    visits = _visits(keys, times[inside], counts.size).reshape(shape)
+    density = counts * (n_points / len(points) / cell**2)
+    shown = np.log10(np.maximum(density, 1e-9))
+    span = tuple(np.percentile(shown[seen], [2, 98]).tolist())
+    most = max(_MOST_VISITS, float(np.percentile(visits[seen], 98)))
+    frame = (cell, float(low[0]), float(low[1]))
+    return Coverage(
+        map_view(
+            _picture(shown, seen, span, HEIGHT, frame),
+            "log₁₀ of points per m²",
+            HEIGHT,
+            name="Point density from above",
+        ),
+        map_view(
+            _picture(visits, seen, (1.0, most), TIME, frame),
+            "visits",
+            TIME,
+            name="Visits from above",
+        ),
+        cell,
+        float(np.count_nonzero(seen) * cell**2),
+        float(np.median(density[seen])),
+        float((visits[seen] > 1).mean()),
+    )
+
+
+def _visits(keys: NDArray[np.int64], times: NDArray[np.float64], n: int) -> NDArray[np.float64]:
+    """Count the visits of each of `n` cells."""
+    order = np.lexsort((times, keys))
+    keys, times = keys[order], times[order]
+    again = (keys[1:] == keys[:-1]) & (np.diff(times) > _APART)
+    visits = np.bincount(keys[1:][again], minlength=n).astype(np.float64)
+    visits[np.unique(keys)] += 1.0
+    return visits
+
+
+def _picture(
+    values: NDArray[np.float64],
+    seen: NDArray[np.bool_],
+    span: tuple[float, float],
+    table: tuple[str, ...],
+    frame: tuple[float, float, float],
+) -> View:
+    """Enlarge cells (across, up) to a picture."""
+    cell, left, bottom = frame
+    low, high = span
+    shade = (values - low) / max(high - low, 1e-9)
+    image = np.full((*values.shape, 3), PAPER, np.uint8)
+    image[seen] = colour(shade[seen], table)
+    times = max(1, round(_WIDTH / max(values.shape)))
+    image = image.transpose(1, 0, 2)[::-1].repeat(times, axis=0).repeat(times, axis=1)
+    top = bottom + cell * values.shape[1]
+    return View(np.ascontiguousarray(image), cell / times, left, top, low, high)

@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""What closing the loops did, and how well places agree that were seen again."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bentwing.report.sections import DASH, Row, table
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from bentwing.evaluate.map import Thickness
+    from bentwing.evaluate.revisits import Revisits
+
+_SPAN = 20.0  # s, of the flight that are one side of a loop
+_SHOWN = 12  # loops in the table, those with most patches
+_FEWEST = 5  # patches that make a loop
+_WALLS = 2.0  # thicknesses of a wall that both sides may be apart
+
+
+def consistency_table(walls: Thickness | None, revisits: Revisits | None) -> str:
+    """Make the table of how well the map agrees with itself."""
+    rows: list[Row] = []
+    if walls is not None:
+        half = f"middle half {1e3 * walls.p25:.1f} to {1e3 * walls.p75:.1f} mm, {len(walls.stds):,} patches"
+        rows.append(
+            (
+                "thickness of flat surfaces, one standard deviation",
+                f"{1e3 * walls.median:.1f} mm",
+                half,
+            )
+        )
+    if revisits is not None:
+        rest = f"95 % below {1e3 * revisits.p95:.1f} mm, {revisits.n_patches:,} patches"
+        rows.append(
+            ("offset between two visits, standard deviation", f"{1e3 * revisits.std:.1f} mm", rest)
+        )
+    rows.append(("against control points or a reference", DASH, "see `bentwing evaluate`"))
+    return table(("measure", "median", "spread"), rows, numbers=frozenset({1}))
+
+
+def closing_table(record: Mapping[str, Any] | None, *, asked: bool) -> str:
+    """Make the table of the global registration: what was matched, and what it moved."""
+    if not record:
+        why = "Not recorded." if asked else "Loops were not to be closed: the map is open-loop."
+        return f'<p class="none">{why}</p>'
+    verdict = "accepted" if record.get("applied") else f"rejected: {record.get('reason')}"
+    rows: list[Row] = [("correction of the whole trajectory", verdict)]
+    if "n_revisits" in record:
+        rows += [
+            ("pairs of stretches that saw the same", f"{record['n_stretch_pairs']:,}"),
+            ("of these seen again later", f"{record['n_revisits']:,}"),
+            ("matches that agree at the end", f"{100 * record['inlier_share']:.1f} %"),
+            ("residual, \N{GREEK SMALL LETTER SIGMA}", f"{record['residual_rms']:.2f}"),
+            ("largest correction", f"{1e3 * record['largest_translation']:.1f} mm, "
+             f"{np.degrees(record['largest_rotation']):.3f}°"),
+        ]  # fmt: skip
+    rows += [
+        (f"iteration {i + 1}", f"{step['n_far_matches']:,} matches between visits, moved "
+         f"{1e3 * step['translation']:.2f} mm")
+        for i, step in enumerate(record.get("iterations") or [])
+    ]  # fmt: skip
+    return table(("closing the loops", ""), rows, numbers=frozenset({1}))
+
+
+def revisits_table(revisits: Revisits | None, thickness: float | None) -> str:
+    """Make the table of loops: which stretches saw the same, and how far apart they have it.
+
+    A loop is accepted whose sides lie within two thicknesses of a wall of each other.
+    """
+    if revisits is None:
+        return '<p class="none">No flat surface was seen in two visits.</p>'
+    limit = max(_WALLS * (thickness or 0.0), 1e-3)
+    loops = _loops(revisits)
+    rows = [
+        (
+            f"{a:.0f} {DASH} {a + _SPAN:.0f} s",
+            f"{b:.0f} {DASH} {b + _SPAN:.0f} s",
+            f"{len(offsets):,}",
+            f"{1e3 * float(np.median(np.abs(offsets))):.1f} mm",
+            f"{1e3 * float(np.percentile(np.abs(offsets), 95)):.1f} mm",
+            "agrees" if float(np.median(np.abs(offsets))) <= limit else "does not agree",
+        )
+        for a, b, offsets in loops[:_SHOWN]
+    ]
+    if not rows:
+        return '<p class="none">No two stretches share enough flat surface.</p>'
+    n_good = sum(float(np.median(np.abs(o))) <= limit for _, _, o in loops)
+    head = (
+        "seen at",
+        "seen again at",
+        "patches",
+        "median offset",
+        "95 %",
+        f"within {1e3 * limit:.0f} mm",
+    )
+    note = f'<p class="none">{n_good} of {len(loops)} loops agree; those with most patches are listed.</p>'
+    return table(head, rows, numbers=frozenset({0, 1, 2, 3, 4})) + note
+
+
+def _loops(revisits: Revisits) -> list[tuple[float, float, NDArray[np.float64]]]:
+    """Begin of the earlier stretch, begin of the later one, and offsets; most patches first."""
+    later = np.floor(revisits.middles / _SPAN)
+    earlier = np.floor((revisits.middles - revisits.intervals) / _SPAN)
+    pairs, member = np.unique(np.stack([earlier, later], axis=1), axis=0, return_inverse=True)
+    order = np.argsort(member.ravel(), kind="stable")
+    cuts = np.searchsorted(member.ravel()[order], np.arange(1, len(pairs)))
+    groups = np.split(revisits.offsets[order], cuts)
+    loops = [
+        (_SPAN * float(a), _SPAN * float(b), offsets)
+        for (a, b), offsets in zip(pairs, groups, strict=True)
+        if len(offsets) >= _FEWEST and b > a
+    ]
+    return sorted(loops, key=lambda loop: -len(loop[2]))

@@ -170,5 +170,7 @@ def _quartiles(box: Box) -> float:
 
 def _by_length(widths: dict[float, float]) -> str:
     """Widths of the boxes at the shortest and at the longest length, and the widest."""
-    parts = [f"{widths[length]:.2g} over {length:g} m" for length in (min(widths), max(widths))]
-    return ", ".join(dict.fromkeys(parts))
+    widest = max(widths, key=lambda length: widths[length])
+    shown = sorted({min(widths), widest, max(widths)})
+    parts = [f"{widths[length]:.2g} over {length:g} m" for length in shown]
+    return ", ".join(parts)

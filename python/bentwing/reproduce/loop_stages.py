@@ -16,7 +16,7 @@ import numpy as np
 from bentwing import geometry
 from bentwing.evaluate.trajectory import absolute_error
 from bentwing.global_registration import close_loops
-from bentwing.places import describe_run, link_between, match_places
+from bentwing.places import MatchSettings, describe_run, link_between, match_places
 from bentwing.pose_graph import Links, PoseGraph, deform_trajectory, solve
 from bentwing.preprocess import RecordingPart
 from bentwing.recording import Payload, Recording
@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 
 _TURN, _SHIFT = np.radians(12.0), np.array([1.2, -0.8, 0.0])  # of the drift at the flight's end
 _DRIFT_SIGMA = np.array([0.005, 0.005, 0.03, 0.15, 0.15, 0.05])  # of a link in time, rad and m
+_FEW = MatchSettings(max_candidates=3)  # enough to tie a flight together
 _APART = 2  # places; nearer ones in time are linked by the odometry
 _CROP = 8.0  # m around the middle of the flight
 
@@ -140,10 +141,11 @@ def _linked(drifted: Trajectory, places: list[Place]) -> tuple[Trajectory, int, 
     positions, quats = drifted.interpolate(at)
     nodes = np.tile(np.eye(4), (len(at), 1, 1))
     nodes[:, :3, :3], nodes[:, :3, 3] = geometry.to_matrices(quats), positions
+    half = len(places) // 2  # the flight out against the flight back
     found = [
-        c
-        for c in match_places(places, places)
-        if c.accepted and c.alignment is not None and c.j - c.i >= _APART
+        replace(c, j=c.j + half)
+        for c in match_places(places[:half], places[half:], settings=_FEW)
+        if c.accepted and c.alignment is not None and c.j + half - c.i >= _APART
     ]
     pairs = [(k, k + 1) for k in range(len(at) - 1)] + [(c.i, c.j) for c in found]
     n_time = len(at) - 1

@@ -26,12 +26,14 @@ if TYPE_CHECKING:
 
     from bentwing.estimators.interface import Estimate, Estimator
     from bentwing.global_registration import Closed
-    from bentwing.localize import PriorMap
+    from bentwing.localize import GivenCoordinates, PriorMap
     from bentwing.map.chunk import MapChunk
     from bentwing.preprocess import RecordingPart
     from bentwing.progress import Stage
     from bentwing.run import Run
     from bentwing.run_folder import RunFolder
+
+    Placed = Georeferenced | GivenCoordinates
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,11 +134,15 @@ def _closed(job: Job, found: Estimate, budget: Budget, shown: Stage) -> Closed:
     return close_loops(found, batches, payload, budget=budget, known=known, threads=threads)
 
 
-def put_on_earth(job: Job) -> Georeferenced | None:
+def put_on_earth(job: Job) -> Placed | None:
     """Find where on the Earth the map is; one that has no place there is still a map."""
     found, part, folder = job.run.estimate, job.part, job.folder
     if found is None:
         return None
+    if job.prior is not None:
+        given = job.prior.coordinates
+        folder.record["georeference"] = None if given is None else given.record
+        return given
     gnss = part.payload.gnss
     with folder.stage("georeference"), Progress().stage("georeference", part.length) as unseen:
         try:
@@ -161,7 +167,7 @@ def put_on_earth(job: Job) -> Georeferenced | None:
     return placed
 
 
-def write_map(job: Job, placed: Georeferenced | None) -> None:
+def write_map(job: Job, placed: Placed | None) -> None:
     """Write the cleaned and thinned map, and what has changed since the one it was found in."""
     found, folder, map_format = job.run.estimate, job.folder, job.asked["map_format"]
     if found is None:
@@ -189,17 +195,19 @@ def write_map(job: Job, placed: Georeferenced | None) -> None:
                 writer.write(chunk)
         counts["map.written"] = writer.n_points
         if difference is not None:
-            _write_changes(job, difference)
+            _write_changes(job, difference, placed)
 
 
-def _write_changes(job: Job, difference: Difference) -> None:
+def _write_changes(job: Job, difference: Difference, placed: Placed | None) -> None:
     map_format = job.asked["map_format"]
     job.folder.record["localization"] |= difference.record
     clouds = {"appeared": difference.appeared, "disappeared": difference.disappeared}
     for name, points in clouds.items():
         path = job.folder.file(f"{name}.{map_format}")
-        with open_map(path, map_format, job.origin_ns) as writer:
-            writer.write(untimed(points))
+        with open_map(
+            path, map_format, job.origin_ns, None if placed is None else placed.crs_wkt
+        ) as writer:
+            writer.write(untimed(points if placed is None else placed.to_projected(points)))
 
 
 def _projected(

@@ -7,6 +7,7 @@ whole trajectory is registered with it (Kaul 2015, sections 2.1 and 2.2).
 
 from __future__ import annotations
 
+from bentwing.localize.coordinates import GivenCoordinates
 from bentwing.localize.difference import Difference, ReferenceCloud
 from bentwing.localize.localization import Localized, NotInMapError, find_in_map
 from bentwing.localize.placement import Placement, place_in_map
@@ -14,6 +15,7 @@ from bentwing.localize.prior_map import PriorMap, read_prior_map
 
 __all__ = [
     "Difference",
+    "GivenCoordinates",
     "Localized",
     "NotInMapError",
     "Placement",

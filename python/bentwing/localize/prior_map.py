@@ -10,6 +10,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bentwing.errors import InputError
+from bentwing.localize.coordinates import (
+    GivenCoordinates,
+    coordinates_of_cloud,
+    coordinates_of_run,
+)
 from bentwing.localize.difference import ReferenceCloud
 from bentwing.localize.map_surfels import MapSurfels, SurfelMaker, core_surfels
 from bentwing.map.read import read_parts
@@ -22,8 +27,10 @@ if TYPE_CHECKING:
 
     from bentwing import _core
     from bentwing.estimators.settings import SurfelSettings
-    from bentwing.places import Place
+    from bentwing.places import Place, RunMap
     from bentwing.trajectory import Trajectory
+
+    Seen = tuple[NDArray[np.float64], NDArray[np.float64] | None]
 
 # What is farther from the trajectory than this is out of sight, m.
 _REACH = 60.0
@@ -41,6 +48,7 @@ class PriorMap:
     surfels : of each level, with which the recording is registered
     cloud : with which its points are compared
     n_points : of the map
+    coordinates : those of the map, where they are not those of the others here
     """
 
     path: Path
@@ -49,6 +57,7 @@ class PriorMap:
     surfels: list[MapSurfels]
     cloud: ReferenceCloud
     n_points: int
+    coordinates: GivenCoordinates | None
 
     def surfels_near(self, trajectory: Trajectory) -> _core.Surfels:
         """Return the surfels a recording could see, as the registration takes them."""
@@ -69,8 +78,10 @@ def read_prior_map(path: Path, settings: SurfelSettings) -> PriorMap:
         If the file cannot be read, or holds no surfaces.
     """
     path = Path(path)
+    run = map_of_run(path) if path.is_dir() else None
+    given = coordinates_of_cloud(path) if run is None else coordinates_of_run(run.georeference)
     maker, cloud, n_points = SurfelMaker(settings), ReferenceCloud(), 0
-    for points, origins in _parts(path):
+    for points, origins in _parts_of_cloud(path, given) if run is None else _parts_of_run(run):
         maker.add(points, origins)
         cloud.add(points, origins)
         n_points += len(points)
@@ -78,21 +89,20 @@ def read_prior_map(path: Path, settings: SurfelSettings) -> PriorMap:
     if not any(len(s.means) for s in surfels):
         msg = f"{path}: {n_points} points hold no surfaces of {settings.voxel_size:g} m or more"
         raise InputError(f"{msg}; is it a map, in metres?")
-    file = map_of_run(path).path if path.is_dir() else path
-    return PriorMap(path, file, _places(path), surfels, cloud, n_points)
+    if run is not None:
+        return PriorMap(path, run.path, places_of_run(path), surfels, cloud, n_points, given)
+    places = places_of_cloud(path, shift=None if given is None else given.given)
+    return PriorMap(path, path, places, surfels, cloud, n_points, given)
 
 
-def _places(path: Path) -> list[Place]:
-    return places_of_run(path) if path.is_dir() else places_of_cloud(path)
+def _parts_of_cloud(path: Path, given: GivenCoordinates | None) -> Iterator[Seen]:
+    """Points (N, 3) of a cloud; where each was seen from is not known."""
+    for part in read_parts(path, None if given is None else given.record):
+        yield part.points[np.isfinite(part.points).all(axis=1)], None
 
 
-def _parts(path: Path) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64] | None]]:
-    """Points (N, 3) of a map, and where each was seen from, if that is known."""
-    if not path.is_dir():
-        for part in read_parts(path):
-            yield part.points[np.isfinite(part.points).all(axis=1)], None
-        return
-    run = map_of_run(path)
+def _parts_of_run(run: RunMap) -> Iterator[Seen]:
+    """Points (N, 3) of a run's map, and where each was seen from, if the map has times."""
     poses = run.trajectory
     for points, times in run.parts():
         if times is None:

@@ -35,13 +35,14 @@ class RunMap:
     path : of the map's file
     trajectory : on the clock of the run
     segments : first and last time of each stretch of it without a break, s
+    georeference : of the map's coordinates, as run.json has it
     """
 
     path: Path
     trajectory: Trajectory
     segments: list[tuple[float, float]]
+    georeference: Mapping[str, Any] | None
     _origin: float
-    _georeference: Mapping[str, Any] | None
 
     def parts(self) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64] | None]]:
         """Points (N, 3) m, map frame, and their times (N,) on the clock of the trajectory if the map has any.
@@ -51,7 +52,7 @@ class RunMap:
         InputError
             If the map cannot be read.
         """
-        for part in read_parts(self.path, self._georeference):
+        for part in read_parts(self.path, self.georeference):
             yield part.points, None if part.times is None else part.times - self._origin
 
 
@@ -77,7 +78,7 @@ def map_of_run(folder: Path) -> RunMap:
     trajectory = Trajectory(absolute.times + begin, absolute.positions, absolute.quats_xyzw)
     is_las = path.suffix in {".laz", ".las"}
     origin = adjusted_gps_origin(first_ns - round(begin * 1e9)) if is_las else 0.0
-    return RunMap(path, trajectory, segments, origin, record.get("georeference"))
+    return RunMap(path, trajectory, segments, record.get("georeference"), origin)
 
 
 def places_of_run(folder: Path, settings: PlaceSettings | None = None) -> list[Place]:
@@ -102,8 +103,17 @@ def places_of_run(folder: Path, settings: PlaceSettings | None = None) -> list[P
     return [*places, *describe_parts(stream.finish(), settings)]
 
 
-def places_of_cloud(path: Path, settings: PlaceSettings | None = None) -> list[Place]:
+def places_of_cloud(
+    path: Path,
+    settings: PlaceSettings | None = None,
+    *,
+    shift: NDArray[np.float64] | None = None,
+) -> list[Place]:
     """Describe the places of a gravity-aligned cloud without a run: the whole of it, or tiles.
+
+    Parameters
+    ----------
+    shift : (3,) m, taken off the coordinates of a cloud far from its origin
 
     Raises
     ------
@@ -111,4 +121,5 @@ def places_of_cloud(path: Path, settings: PlaceSettings | None = None) -> list[P
         If the file cannot be read.
     """
     points = read_points(Path(path))
-    return describe_run(points[np.isfinite(points).all(axis=1)], settings=settings)
+    points = points[np.isfinite(points).all(axis=1)]
+    return describe_run(points if shift is None else points - shift, settings=settings)

@@ -14,9 +14,9 @@ from bentwing.evaluate.map import wall_thickness
 from bentwing.evaluate.revisits import revisit_consistency
 from bentwing.report import sections
 from bentwing.report.calibration import calibration_table
-from bentwing.report.merging import merging_section
 from bentwing.report.coverage import draw_coverage
 from bentwing.report.loops import closing_table, consistency_table, revisits_table
+from bentwing.report.merging import merging_section
 from bentwing.report.plot import Series, line_plot
 from bentwing.report.scene import scene
 from bentwing.report.stretches import degenerate_spans, spans_sentence

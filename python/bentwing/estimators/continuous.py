@@ -60,7 +60,7 @@ class Continuous:
         self._bridged: tuple[OdometryPass, Break] | None = None
         # Whether the lidar is a 2D one, which sees single planes when its head stands still; the pass as
         # it was when the head came to stand, and since when it stands.
-        self._is_planar: bool | None = None
+        self._is_planar = True
         self._spin = SpinWatch(by_encoder=payload.encoder is not None)
         self._stalled: tuple[OdometryPass, float] | None = None
         self._notes: list[str] = []
@@ -75,7 +75,7 @@ class Continuous:
         self._buffer.add(batch)
         if not len(batch.times):
             return
-        if self._is_planar is None and isinstance(batch, LidarBatch):
+        if self._is_planar and isinstance(batch, LidarBatch) and len(batch.times) >= 3:
             self._is_planar = is_plane(batch.points)
         self._spin.add(batch)
 

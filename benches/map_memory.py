@@ -40,7 +40,9 @@ def trajectory(duration: float) -> Trajectory:
     """Fly straight on, the head spinning."""
     times = np.arange(0.0, duration + 0.01, 0.01)
     positions = np.stack([SPEED * times, 3 * np.sin(0.1 * times), 0 * times], axis=1)
-    return Trajectory(times, positions, geometry.exp(np.c_[4.0 * times % 6.28, 0 * times, 0 * times]))
+    return Trajectory(
+        times, positions, geometry.exp(np.c_[4.0 * times % 6.28, 0 * times, 0 * times])
+    )
 
 
 def batches(n: int, flight: Trajectory) -> Iterator[LidarBatch]:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import uuid
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -33,16 +34,41 @@ def require_pye57() -> Any:  # noqa: ANN401 - the package has no types
     return pye57
 
 
+def _file_in(pye57: Any, crs_wkt: str) -> Any:  # noqa: ANN401 - as above
+    """Return pye57's file for a coordinate system, which its own header leaves empty for good."""
+    lib = pye57.libe57
+
+    class File(pye57.E57):  # type: ignore[misc] # the package has no types
+        def write_default_header(self) -> None:
+            image, root = self.image_file, self.root
+            image.extensionsAdd("", lib.E57_V1_0_URI)
+            texts = {
+                "formatName": "ASTM E57 3D Imaging Data File",
+                "guid": f"{{{uuid.uuid4()}}}",
+                "e57LibraryVersion": lib.E57_LIBRARY_ID,
+                "coordinateMetadata": crs_wkt,
+            }
+            for name, text in texts.items():
+                root.set(name, lib.StringNode(image, text))
+            root.set("versionMajor", lib.IntegerNode(image, lib.E57_FORMAT_MAJOR))
+            root.set("versionMinor", lib.IntegerNode(image, lib.E57_FORMAT_MINOR))
+            created = lib.StructureNode(image)
+            created.set("dateTimeValue", lib.FloatNode(image, 0.0))
+            created.set("isAtomicClockReferenced", lib.IntegerNode(image, 0))
+            root.set("creationDateTime", created)
+            root.set("data3D", lib.VectorNode(image, True))  # noqa: FBT003 - its only form
+            root.set("images2D", lib.VectorNode(image, True))  # noqa: FBT003
+
+    return File
+
+
 class E57Writer(MapWriter):
     """Writer of E57, as scans of `POINTS_PER_SCAN` points in one frame."""
 
     def _begin(self, first: MapChunk) -> None:
         pye57 = require_pye57()
         self._has_intensity = first.intensity is not None
-        self._file = pye57.E57(str(self._temporary), mode="w")
-        if self.crs_wkt is not None:
-            node = pye57.libe57.StringNode(self._file.image_file, self.crs_wkt)
-            self._file.root.set("coordinateMetadata", node)
+        self._file = _file_in(pye57, self.crs_wkt or "")(str(self._temporary), mode="w")
         self._waiting: list[MapChunk] = []
         self._n_waiting = 0
 

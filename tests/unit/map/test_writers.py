@@ -3,12 +3,14 @@ import signal
 import subprocess
 import sys
 import tracemalloc
+from dataclasses import replace
 
 import laspy
 import numpy as np
 import pytest
 
 from bentwing.errors import EstimationError, InputError, UsageError
+from bentwing.geodesy import ProjectedSystem
 from bentwing.map.chunk import MapChunk
 from bentwing.map.gps_time import adjusted_gps_origin
 from bentwing.map.read import read_points
@@ -206,3 +208,88 @@ def test_a_map_of_an_unknown_kind_says_what_is_read(tmp_path):
 
 def test_all_formats_have_a_writer():
     assert set(MAP_FORMATS) == {*READABLE, "e57"}
+
+
+def full(n, seed=0, shift=(0.0, 0.0, 0.0)):
+    rng = np.random.default_rng(seed)
+    part = chunk(n, seed)
+    return replace(
+        part,
+        points=part.points + shift,
+        incidence=rng.uniform(0, 1.5, n).astype(np.float32),
+        thickness=rng.uniform(0, 0.05, n).astype(np.float32),
+        run_id=np.full(n, 3, np.uint16),
+    )
+
+
+UTM_SHIFT = (694_750.25, 5_177_603.5, 427.0)
+
+
+@pytest.fixture(scope="module")
+def utm():
+    return ProjectedSystem.of_epsg(32632)
+
+
+def test_laz_carries_incidence_thickness_and_run(tmp_path):
+    part = full(500)
+    las = laspy.read(written(tmp_path / "map.laz", "laz", part))
+    names = ["range", "ring", "incidence", "thickness", "run_id"]
+    assert list(las.point_format.extra_dimension_names) == names
+    assert np.abs(las["incidence"] - np.degrees(part.incidence)).max() <= 1 / 16 + 1e-4
+    assert np.abs(las["thickness"] - part.thickness).max() <= 1 / 16384 + 1e-7
+    assert (las["run_id"] == 3).all()
+    assert (las.point_source_id == 3).all()
+
+
+def test_what_has_no_surface_is_not_a_number(tmp_path):
+    part = replace(full(3), thickness=np.array([np.nan, 0.01, np.nan], np.float32))
+    las = laspy.read(written(tmp_path / "map.laz", "laz", part))
+    assert np.isnan(las["thickness"]).tolist() == [True, False, True]
+
+
+@pytest.mark.parametrize("kind", ["ply", "pcd"])
+def test_rows_have_incidence_in_degrees(tmp_path, kind):
+    part = full(10)
+    data = written(tmp_path / f"map.{kind}", kind, part).read_bytes()
+    xyz = "<f8" if kind == "ply" else "<f4"
+    row = np.dtype(
+        [("xyz", xyz, 3), ("t", "<f8"), ("range", "<f4"), ("intensity", "<f4"), ("ring", "<u2"),
+         ("incidence", "<f4"), ("thickness", "<f4"), ("run_id", "<u2")]
+    )  # fmt: skip
+    table = np.frombuffer(data[-10 * row.itemsize :], row)
+    assert np.allclose(table["incidence"], np.degrees(part.incidence))
+    assert np.array_equal(table["thickness"], part.thickness)
+    assert (table["run_id"] == 3).all()
+
+
+@pytest.mark.parametrize("map_format", READABLE)
+def test_a_map_on_the_earth_keeps_its_millimetres_in_every_format(tmp_path, map_format, utm):
+    part = full(400, shift=UTM_SHIFT)
+    path = tmp_path / f"map.{map_format}"
+    with open_map(path, map_format, ORIGIN_NS, utm.wkt) as writer:
+        writer.write(part)
+    assert np.abs(read_points(path) - part.points).max() < 1e-4
+
+
+def test_the_epsg_code_is_in_the_header(tmp_path, utm):
+    with open_map(tmp_path / "map.laz", "laz", ORIGIN_NS, utm.wkt) as writer:
+        writer.write(full(10, shift=UTM_SHIFT))
+    with laspy.open(tmp_path / "map.laz") as file:
+        assert file.header.global_encoding.wkt
+        assert file.header.parse_crs().to_epsg() == 32632
+    for kind in ("ply", "pcd"):
+        with open_map(tmp_path / f"map.{kind}", kind, ORIGIN_NS, utm.wkt) as writer:
+            writer.write(full(10, shift=UTM_SHIFT))
+        head = (tmp_path / f"map.{kind}").read_bytes()[:2000]
+        assert b'AUTHORITY["EPSG","32632"]' in head
+
+
+def test_e57_on_the_earth_keeps_its_millimetres_and_its_system(tmp_path, utm):
+    pye57 = pytest.importorskip("pye57", reason="pye57 is an optional package")
+    part = full(400, shift=UTM_SHIFT)
+    with open_map(tmp_path / "map.e57", "e57", ORIGIN_NS, utm.wkt) as writer:
+        writer.write(part)
+    assert np.abs(read_points(tmp_path / "map.e57") - part.points).max() < 1e-4
+    file = pye57.E57(str(tmp_path / "map.e57"))
+    assert '"32632"' in file.root["coordinateMetadata"].value()
+    file.close()

@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""Maps opened by programs that are not ours, where they are installed."""
+
+import json
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+
+from bentwing.geodesy import ProjectedSystem
+from bentwing.map.chunk import MapChunk
+from bentwing.map.gps_time import adjusted_gps_origin
+from bentwing.map.writer import open_map
+
+ORIGIN_NS = 1_700_000_000_000_000_000
+UTM = 32632
+SHIFT = np.array([694_750.25, 5_177_603.5, 427.0])
+N = 60_000  # more than a chunk of LAZ
+
+
+@pytest.fixture(scope="module")
+def part():
+    rng = np.random.default_rng(0)
+    return MapChunk(
+        rng.uniform(-30, 30, (N, 3)) + SHIFT,
+        np.sort(rng.uniform(0, 60, N)),
+        rng.uniform(0, 30, N).astype(np.float32),
+        rng.uniform(0, 255, N).astype(np.float32),
+        rng.integers(0, 16, N).astype(np.uint16),
+        incidence=rng.uniform(0, 1.5, N).astype(np.float32),
+        thickness=rng.uniform(0, 0.05, N).astype(np.float32),
+        run_id=np.zeros(N, np.uint16),
+    )
+
+
+def write(path, part):
+    system = ProjectedSystem.of_epsg(UTM)
+    with open_map(path, path.suffix[1:], ORIGIN_NS, system.wkt) as writer:
+        writer.write(part)
+    return path
+
+
+@pytest.mark.skipif(shutil.which("pdal") is None, reason="PDAL is not installed")
+@pytest.mark.parametrize("kind", ["laz", "las"])
+def test_pdal_agrees_on_count_bounds_times_and_system(tmp_path, part, kind):
+    path = write(tmp_path / f"map.{kind}", part)
+
+    def info(*options):
+        command = ["pdal", "info", *options, str(path)]
+        return json.loads(subprocess.run(command, check=True, capture_output=True).stdout)
+
+    summary = info("--summary")["summary"]
+    assert summary["num_points"] == N
+    assert f'"{UTM}"' in summary["srs"]["wkt"]
+    stats = {row["name"]: row for row in info("--stats")["stats"]["statistic"]}
+    for axis, name in enumerate("XYZ"):
+        assert stats[name]["minimum"] == pytest.approx(part.points[:, axis].min(), abs=1e-4)
+        assert stats[name]["maximum"] == pytest.approx(part.points[:, axis].max(), abs=1e-4)
+    origin = adjusted_gps_origin(ORIGIN_NS)
+    assert stats["GpsTime"]["minimum"] == pytest.approx(origin + part.times[0], abs=1e-6)
+    assert stats["GpsTime"]["maximum"] == pytest.approx(origin + part.times[-1], abs=1e-6)
+    for name, values in (("range", part.ranges), ("thickness", part.thickness)):
+        assert stats[name]["average"] == pytest.approx(float(values.mean()), rel=1e-3)
+
+
+def test_laszip_agrees_on_every_point(tmp_path, part):
+    """The original library, instead of the one whose compressor we use."""
+    pytest.importorskip("laszip", reason="laszip is not installed")
+    import laspy
+
+    path = write(tmp_path / "map.laz", part)
+    las = laspy.read(path, laz_backend=laspy.LazBackend.Laszip)
+    assert len(las) == N
+    assert np.abs(las.xyz - part.points).max() < 1e-4
+    assert np.array_equal(las["range"], part.ranges)
+    assert np.allclose(las.gps_time, adjusted_gps_origin(ORIGIN_NS) + part.times, atol=1e-7)
+
+
+@pytest.mark.parametrize("kind", ["ply", "pcd"])
+def test_open3d_agrees_on_count_and_bounds(tmp_path, part, kind):
+    o3d = pytest.importorskip("open3d", reason="Open3D is not installed")
+    path = write(tmp_path / f"map.{kind}", part)
+    cloud = o3d.t.io.read_point_cloud(str(path))
+    points = cloud.point.positions.numpy().astype(np.float64)
+    # PCD is in single precision, relative to the offset that its header names
+    offset = np.array([695_000.0, 5_178_000.0, 0.0]) if kind == "pcd" else np.zeros(3)
+    assert np.abs(points + offset - part.points).max() < 1e-4
+    assert np.allclose(cloud.point["time"].numpy().ravel(), part.times, atol=1e-6)
+
+
+def test_libe57_agrees_on_count_and_bounds(tmp_path, part):
+    pye57 = pytest.importorskip("pye57", reason="pye57 is an optional package")
+    file = pye57.E57(str(write(tmp_path / "map.e57", part)))
+    scan = file.read_scan(0, ignore_missing_fields=True)
+    points = np.stack([scan[f"cartesian{axis}"] for axis in "XYZ"], axis=1)
+    assert len(points) == N
+    assert np.abs(points - part.points).max() < 1e-4
+    file.close()

@@ -8,12 +8,13 @@ use nalgebra::{Matrix3, Matrix6, SMatrix, Vector3};
 use crate::drift::Drift;
 use crate::error::KalmanError;
 use crate::features::{Feature, Sweep, features};
+use crate::gain;
 use crate::map::{LocalMap, MapSettings};
 use crate::measure::{Moment, Mounts, Turning, place};
 use crate::nodes::{Node, correct, moment};
 use crate::odometry::{HighRate, OdometryPose};
 use crate::predict::{Noise, Sample, spread, step, walk};
-use crate::state::{DIM, Mounted, Square, State, at};
+use crate::state::{DIM, Mounted, Square, State, Tangent, at};
 use crate::update::{Fit, Rules, Seen, update};
 
 /// No carrier is faster, m/s.
@@ -22,6 +23,8 @@ const MAX_SPEED: f64 = 100.0;
 const MAX_LATENCY: f64 = 0.05;
 /// The density of force and rate is unknown while no sample says it: so many times the sensor's.
 const BLIND: f64 = 300.0;
+/// A velocity of more standard deviations is none of a carrier at rest.
+const REST_GATE: f64 = 4.0;
 /// Samples farther apart, s, say nothing of the time between them.
 const MAX_STEP: f64 = 0.05;
 
@@ -42,6 +45,8 @@ pub struct Settings {
     pub max_iterations: usize,
     /// Information of a feature relative to that of an independent one.
     pub independence: f64,
+    /// Standard deviation of what the stamps of a sweep are wrong by in common, s.
+    pub stamp_jitter: f64,
     /// Whether depth edges take part.
     pub edges: bool,
     /// Axis of the motor, motor frame.
@@ -293,6 +298,7 @@ impl Filter {
         let rules = Rules {
             max_iterations: self.settings.max_iterations,
             independence: self.settings.independence,
+            stamp_jitter: self.settings.stamp_jitter,
         };
         let predicted = self.state;
         walk(&mut self.P, &self.settings.noise, self.time - self.updated);
@@ -337,6 +343,38 @@ impl Filter {
             .nodes
             .partition_point(|n| n.time < self.time - MAX_LATENCY);
         self.nodes.drain(..keep.saturating_sub(1));
+    }
+
+    /// Corrects the state by the knowledge that the carrier is at rest: its velocity is zero with the
+    /// standard deviation `sigma`, m/s. Returns whether it can be; otherwise nothing is changed.
+    ///
+    /// To be called after an update. A lidar whose motor has not begun to turn sees too little to hold
+    /// the position, which the inertial samples alone lose by centimetres within a second.
+    pub fn rest(&mut self, sigma: f64) -> bool {
+        let variance = sigma * sigma;
+        let moves = |i: usize| {
+            let v = self.state.v[i];
+            v * v
+                > REST_GATE * REST_GATE * (self.P[(at::VELOCITY + i, at::VELOCITY + i)] + variance)
+        };
+        if (0..3).any(moves) {
+            return false;
+        }
+        let (mut information, mut gradient) = (Square::zeros(), Tangent::zeros());
+        for i in 0..3 {
+            information[(at::VELOCITY + i, at::VELOCITY + i)] = 1.0 / variance;
+            gradient[at::VELOCITY + i] = self.state.v[i] / variance;
+        }
+        let Some(P) = gain::posterior(&self.P, &information) else {
+            return false;
+        };
+        self.state = self.state.plus(&-(P * gradient));
+        self.P = P;
+        if let Some(last) = self.nodes.last_mut() {
+            last.pose = self.state.pose;
+            last.v = self.state.v;
+        }
+        true
     }
 
     /// Covariance (6 × 6) of attitude and position, with that of the map they are in.

@@ -37,6 +37,8 @@ SLOW = np.r_[9:31]
 REST_SPEED, MOVING_SPEED = 0.01, 1.0
 # What one feature says beside its neighbours on the same surface, whose errors it shares.
 INDEPENDENCE = 0.25
+# By so much the stamps of a sweep are wrong in common, s, as drivers give them.
+STAMP_JITTER = 2e-4
 # Features after which a voxel is known.
 CELL_POINTS = 300
 # Least distance between the features of an update, m.
@@ -66,6 +68,7 @@ class FilterSettings:
     spacing: float
     max_iterations: int
     independence: float
+    stamp_jitter: float
     edges: bool
     axis: list[float]
     pose_interval: float
@@ -96,6 +99,7 @@ class FilterSettings:
             spacing=SPACING,
             max_iterations=settings.max_iterations,
             independence=INDEPENDENCE,
+            stamp_jitter=STAMP_JITTER,
             edges=settings.edges,
             axis=axis.tolist(),
             pose_interval=DT,

@@ -286,10 +286,7 @@ impl Filter {
             (thin(&points, self.settings.spacing, self.settings.max_features).into_iter())
                 .map(|i| planar[i])
                 .collect();
-        let turning = Turning {
-            axis: self.settings.axis,
-            rate: motor_rate(sweep),
-        };
+        let turning = turning(sweep, self.settings.axis);
         let seen = Seen {
             planar: &chosen,
             edges: &edges,
@@ -312,7 +309,7 @@ impl Filter {
         let edges: Vec<_> = edges.iter().map(placed).collect();
         let birth = self.drift.birth();
         let new_share = self.map.insert(&planar, &edges, birth);
-        let (base, in_map) = self.base();
+        let (base, in_map) = self.view(turning.rate);
         let here = self.state.pose.t;
         let matched = fit.as_ref().map_or(&[][..], |f| &f.births);
         self.drift.add(matched, &in_map, &base);
@@ -383,9 +380,10 @@ impl Filter {
             + self.drift.covariance(&self.state.pose.t)
     }
 
-    /// Position of the motor (or the fixed lidar) and the covariance of its pose: what it sees comes
-    /// to lie where it is, however the IMU is mounted on it.
-    fn base(&self) -> (Vector3<f64>, Matrix6<f64>) {
+    /// Position of the motor (or the fixed lidar) and the covariance of the view from there: what is
+    /// seen comes to lie where the motor is and as far about its axis as the encoder's delay is wrong
+    /// at a `rate`, rad/s, however the IMU is mounted on it.
+    fn view(&self, rate: f64) -> (Vector3<f64>, Matrix6<f64>) {
         let R = self.state.pose.R.to_rotation_matrix().into_inner();
         let lever = R * self.state.base.t;
         let mut effect = SMatrix::<f64, 6, DIM>::zeros();
@@ -397,6 +395,10 @@ impl Filter {
         set(3, at::POSITION, &Matrix3::identity());
         set(3, at::ROTATION, &-so3::hat(&lever));
         set(3, at::BASE_TRANSLATION, &R);
+        let axis = self.state.pose.R * self.state.base.R * self.settings.axis;
+        effect
+            .fixed_view_mut::<3, 1>(0, at::ENCODER_DELAY)
+            .copy_from(&(axis * -rate));
         (
             self.state.pose.t + lever,
             effect * self.P * effect.transpose(),
@@ -415,10 +417,39 @@ impl Filter {
     }
 }
 
-/// Mean rate of the motor over a sweep, rad/s.
-fn motor_rate(sweep: &Sweep<'_>) -> f64 {
-    match (sweep.angles, sweep.times) {
-        ([first, .., last], [begin, .., end]) if end > begin => (last - first) / (end - begin),
-        _ => 0.0,
+/// How the motor turns during a sweep: a constant change of its rate, by the means of both halves.
+fn turning(sweep: &Sweep<'_>, axis: Vector3<f64>) -> Turning {
+    let (angles, times, n) = (sweep.angles, sweep.times, sweep.times.len());
+    let still = Turning {
+        axis,
+        rate: 0.0,
+        change: 0.0,
+        middle: 0.0,
+    };
+    if angles.len() != n || n < 3 {
+        return still;
+    }
+    let (first, half, last) = (0, n / 2, n - 1);
+    let (a, b) = (times[half] - times[first], times[last] - times[half]);
+    let middle = 0.5 * (times[first] + times[last]);
+    if times[last] <= times[first] {
+        return still;
+    }
+    let rate = (angles[last] - angles[first]) / (times[last] - times[first]);
+    // A sweep with most of its points at one end tells the mean only.
+    let change = if a.min(b) < 0.2 * (a + b) {
+        0.0
+    } else {
+        let halves = [
+            (angles[half] - angles[first]) / a,
+            (angles[last] - angles[half]) / b,
+        ];
+        2.0 * (halves[1] - halves[0]) / (a + b)
+    };
+    Turning {
+        axis,
+        rate,
+        change,
+        middle,
     }
 }

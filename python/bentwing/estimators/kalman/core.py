@@ -190,6 +190,21 @@ def anchored(covariance: NDArray[np.float64], state: FilterState) -> NDArray[np.
     return np.asarray(effect @ covariance @ effect.T)
 
 
+def unlearned_delay(rate: float, mount: MotorMount, state: FilterState) -> NDArray[np.float64]:
+    """Return a covariance (31, 31) to add: as if nothing were known of the encoder's delay alone.
+
+    At a constant rate a longer delay is a turn of the motor's mount about its axis the other way. Only
+    while the rate changes are they told apart, and what is seen then is compared with a map made with
+    the wrong delay, which the filter believes: of that a second beginning from the same data takes the
+    value and not the certainty. What both together are stays known.
+    """
+    quat = np.array(state.base[1])
+    direction = np.zeros(N_STATES)
+    direction[BASE_ROTATION] = rate * geometry.rotate(quat, mount.axis)
+    direction[ENCODER_DELAY] = 1.0
+    return np.asarray(initial_std(moving=False)["latency"] ** 2 * np.outer(direction, direction))
+
+
 def _mounts(mount: Mount) -> tuple[Pose, Pose]:
     if isinstance(mount, FixedMount):
         return mount.T_imu_lidar, Pose(np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]))

@@ -18,6 +18,7 @@ from bentwing.estimators.kalman.core import (
     anchored,
     first_covariance,
     first_state,
+    unlearned_delay,
 )
 from bentwing.estimators.kalman.filter_pass import MIN_POINTS, FilterPass, Rest
 from bentwing.estimators.kalman.outcome import estimate_of
@@ -256,6 +257,8 @@ class Kalman:
         assert self._begun is not None
         state = rehearsed.slow_state(self._begun[0])
         covariance = rehearsed.slow_covariance(self._begun[1], DOUBT)
+        if isinstance(mount := self._filter_mount, MotorMount):
+            covariance += unlearned_delay(rehearsed.motor_rate, mount, state)
         self._passes.append(self._new_pass(state, covariance))
         self._n_small = 0
         return True

@@ -104,9 +104,7 @@ class FilterPass:
             self.windows.append(record_of(stop, len(sweep.times), found))
             self._covariances.append((stop, self.filter.pose_covariance))
             self._watch_motor(sweep)
-        if self._rest is not None and not (
-            self._rest.lasts(imu) and self.filter.rest(REST_SPEED)
-        ):
+        if self._rest is not None and not (self._rest.lasts(imu) and self.filter.rest(REST_SPEED)):
             self._rest = None
         self._poses.append(self.filter.take_poses())
         for kept, new in zip(self._odometry, self.filter.take_odometry(), strict=True):

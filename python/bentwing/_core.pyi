@@ -746,6 +746,14 @@ class KalmanFilter:
     def release(self) -> None:
         """Hand out the poses since the last update without a correction."""
 
+    def rest(self, sigma: float) -> bool:
+        """Correct the state by a velocity of zero; return whether the carrier can be at rest.
+
+        Parameters
+        ----------
+        sigma : m/s, of that velocity
+        """
+
     def take_poses(self) -> _Poses:
         """Return times (N,), positions (N, 3) and quaternions (N, 4) that were not returned before."""
 

@@ -8,12 +8,13 @@ use nalgebra::{Matrix3, Matrix6, SMatrix, Vector3};
 use crate::drift::Drift;
 use crate::error::KalmanError;
 use crate::features::{Feature, Sweep, features};
+use crate::gain;
 use crate::map::{LocalMap, MapSettings};
 use crate::measure::{Moment, Mounts, Turning, place};
 use crate::nodes::{Node, correct, moment};
 use crate::odometry::{HighRate, OdometryPose};
 use crate::predict::{Noise, Sample, spread, step, walk};
-use crate::state::{DIM, Mounted, Square, State, at};
+use crate::state::{DIM, Mounted, Square, State, Tangent, at};
 use crate::update::{Fit, Rules, Seen, update};
 
 /// No carrier is faster, m/s.
@@ -22,6 +23,8 @@ const MAX_SPEED: f64 = 100.0;
 const MAX_LATENCY: f64 = 0.05;
 /// The density of force and rate is unknown while no sample says it: so many times the sensor's.
 const BLIND: f64 = 300.0;
+/// A velocity of more standard deviations is none of a carrier at rest.
+const REST_GATE: f64 = 4.0;
 /// Samples farther apart, s, say nothing of the time between them.
 const MAX_STEP: f64 = 0.05;
 
@@ -42,6 +45,8 @@ pub struct Settings {
     pub max_iterations: usize,
     /// Information of a feature relative to that of an independent one.
     pub independence: f64,
+    /// Standard deviation of what the stamps of a sweep are wrong by in common, s.
+    pub stamp_jitter: f64,
     /// Whether depth edges take part.
     pub edges: bool,
     /// Axis of the motor, motor frame.
@@ -281,10 +286,7 @@ impl Filter {
             (thin(&points, self.settings.spacing, self.settings.max_features).into_iter())
                 .map(|i| planar[i])
                 .collect();
-        let turning = Turning {
-            axis: self.settings.axis,
-            rate: motor_rate(sweep),
-        };
+        let turning = turning(sweep, self.settings.axis);
         let seen = Seen {
             planar: &chosen,
             edges: &edges,
@@ -293,6 +295,7 @@ impl Filter {
         let rules = Rules {
             max_iterations: self.settings.max_iterations,
             independence: self.settings.independence,
+            stamp_jitter: self.settings.stamp_jitter,
         };
         let predicted = self.state;
         walk(&mut self.P, &self.settings.noise, self.time - self.updated);
@@ -306,7 +309,7 @@ impl Filter {
         let edges: Vec<_> = edges.iter().map(placed).collect();
         let birth = self.drift.birth();
         let new_share = self.map.insert(&planar, &edges, birth);
-        let (base, in_map) = self.base();
+        let (base, in_map) = self.view(turning.rate);
         let here = self.state.pose.t;
         let matched = fit.as_ref().map_or(&[][..], |f| &f.births);
         self.drift.add(matched, &in_map, &base);
@@ -339,15 +342,48 @@ impl Filter {
         self.nodes.drain(..keep.saturating_sub(1));
     }
 
+    /// Corrects the state by the knowledge that the carrier is at rest: its velocity is zero with the
+    /// standard deviation `sigma`, m/s. Returns whether it can be; otherwise nothing is changed.
+    ///
+    /// To be called after an update. A lidar whose motor has not begun to turn sees too little to hold
+    /// the position, which the inertial samples alone lose by centimetres within a second.
+    pub fn rest(&mut self, sigma: f64) -> bool {
+        let variance = sigma * sigma;
+        let moves = |i: usize| {
+            let v = self.state.v[i];
+            v * v
+                > REST_GATE * REST_GATE * (self.P[(at::VELOCITY + i, at::VELOCITY + i)] + variance)
+        };
+        if (0..3).any(moves) {
+            return false;
+        }
+        let (mut information, mut gradient) = (Square::zeros(), Tangent::zeros());
+        for i in 0..3 {
+            information[(at::VELOCITY + i, at::VELOCITY + i)] = 1.0 / variance;
+            gradient[at::VELOCITY + i] = self.state.v[i] / variance;
+        }
+        let Some(P) = gain::posterior(&self.P, &information) else {
+            return false;
+        };
+        self.state = self.state.plus(&-(P * gradient));
+        self.P = P;
+        if let Some(last) = self.nodes.last_mut() {
+            last.pose = self.state.pose;
+            last.v = self.state.v;
+        }
+        true
+    }
+
     /// Covariance (6 × 6) of attitude and position, with that of the map they are in.
     pub fn pose_covariance(&self) -> Matrix6<f64> {
         self.P.fixed_view::<6, 6>(at::ROTATION, at::ROTATION)
             + self.drift.covariance(&self.state.pose.t)
     }
 
-    /// Position of the motor (or the fixed lidar) and the covariance of its pose: what it sees comes
-    /// to lie where it is, however the IMU is mounted on it.
-    fn base(&self) -> (Vector3<f64>, Matrix6<f64>) {
+    /// Position of the motor (or the fixed lidar) and the covariance of the view from there: what is
+    /// seen comes to lie where the motor is and as far about its axis as the encoder's delay is wrong
+    /// at a `rate`, rad/s, however the IMU is mounted on it.
+    fn view(&self, rate: f64) -> (Vector3<f64>, Matrix6<f64>) {
         let R = self.state.pose.R.to_rotation_matrix().into_inner();
         let lever = R * self.state.base.t;
         let mut effect = SMatrix::<f64, 6, DIM>::zeros();
@@ -359,6 +395,10 @@ impl Filter {
         set(3, at::POSITION, &Matrix3::identity());
         set(3, at::ROTATION, &-so3::hat(&lever));
         set(3, at::BASE_TRANSLATION, &R);
+        let axis = self.state.pose.R * self.state.base.R * self.settings.axis;
+        effect
+            .fixed_view_mut::<3, 1>(0, at::ENCODER_DELAY)
+            .copy_from(&(axis * -rate));
         (
             self.state.pose.t + lever,
             effect * self.P * effect.transpose(),
@@ -377,10 +417,39 @@ impl Filter {
     }
 }
 
-/// Mean rate of the motor over a sweep, rad/s.
-fn motor_rate(sweep: &Sweep<'_>) -> f64 {
-    match (sweep.angles, sweep.times) {
-        ([first, .., last], [begin, .., end]) if end > begin => (last - first) / (end - begin),
-        _ => 0.0,
+/// How the motor turns during a sweep: a constant change of its rate, by the means of both halves.
+fn turning(sweep: &Sweep<'_>, axis: Vector3<f64>) -> Turning {
+    let (angles, times, n) = (sweep.angles, sweep.times, sweep.times.len());
+    let still = Turning {
+        axis,
+        rate: 0.0,
+        change: 0.0,
+        middle: 0.0,
+    };
+    if angles.len() != n || n < 3 {
+        return still;
+    }
+    let (first, half, last) = (0, n / 2, n - 1);
+    let (a, b) = (times[half] - times[first], times[last] - times[half]);
+    let middle = 0.5 * (times[first] + times[last]);
+    if times[last] <= times[first] {
+        return still;
+    }
+    let rate = (angles[last] - angles[first]) / (times[last] - times[first]);
+    // A sweep with most of its points at one end tells the mean only.
+    let change = if a.min(b) < 0.2 * (a + b) {
+        0.0
+    } else {
+        let halves = [
+            (angles[half] - angles[first]) / a,
+            (angles[last] - angles[half]) / b,
+        ];
+        2.0 * (halves[1] - halves[0]) / (a + b)
+    };
+    Turning {
+        axis,
+        rate,
+        change,
+        middle,
     }
 }

@@ -43,8 +43,19 @@ pub(crate) struct Moment {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Turning {
     pub axis: Vector3<f64>,
-    /// rad/s.
+    /// rad/s, in the middle of the sweep.
     pub rate: f64,
+    /// rad/s², of the rate.
+    pub change: f64,
+    /// s, of the middle.
+    pub middle: f64,
+}
+
+impl Turning {
+    /// How fast the motor turns at a time, rad/s.
+    fn rate_at(&self, time: f64) -> f64 {
+        self.rate + self.change * (time - self.middle)
+    }
 }
 
 /// A feature in the map, with the levers by which the state moves it.
@@ -63,7 +74,8 @@ pub(crate) struct Placed {
     v: Vector3<f64>,
     omega: Vector3<f64>,
     dt: f64,
-    turning: Turning,
+    axis: Vector3<f64>,
+    rate: f64,
 }
 
 /// Rotations of the mounts as matrices, once for all features.
@@ -100,7 +112,8 @@ pub(crate) fn place(
         .into_inner();
     let p = moment.p + part(at::POSITION) - part(at::VELOCITY) * moment.dt - moment.v * late;
     let in_turned = mounts.lidar * feature.p;
-    let angle = feature.angle - turning.rate * state.encoder_delay;
+    let rate = turning.rate_at(feature.time);
+    let angle = feature.angle - rate * state.encoder_delay;
     let turn = so3::exp(&(turning.axis * angle))
         .to_rotation_matrix()
         .into_inner();
@@ -119,7 +132,8 @@ pub(crate) fn place(
         v: moment.v,
         omega: moment.omega,
         dt: moment.dt,
-        turning: *turning,
+        axis: turning.axis,
+        rate,
     }
 }
 
@@ -141,7 +155,7 @@ impl Placed {
         set(18, &self.in_turned.cross(&in_turned));
         set(21, &in_turned);
         h[24] = -(n.dot(&self.v) + about.dot(&self.omega));
-        h[25] = -self.turning.rate * self.turning.axis.cross(&self.in_motor).dot(&in_motor);
+        h[25] = -self.rate * self.axis.cross(&self.in_motor).dot(&in_motor);
         h
     }
 }
@@ -165,7 +179,7 @@ mod tests {
                 R: x0.pose.R, p: x0.pose.t, v: Vector3::new(0.6, -1.0, 0.3),
                 omega: Vector3::new(0.5, 1.0, -2.0), dt: 0.07,
             };
-            let turning = Turning { axis: Vector3::new(0.6, 0.0, 0.8), rate: 6.3 };
+            let turning = Turning { axis: Vector3::new(0.6, 0.0, 0.8), rate: 6.3, change: 2.0, middle: -0.2 };
             let feature = Feature { p: Vector3::from_vec(p), time: 0.0, angle, variance: 1.0 };
             let d = Tangent::from_vec(values);
             let n = Vector3::from_vec(n);

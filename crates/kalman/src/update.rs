@@ -33,6 +33,8 @@ pub(crate) struct Rules {
     pub max_iterations: usize,
     /// Information of a feature relative to that of an independent one.
     pub independence: f64,
+    /// Standard deviation of what the stamps of a sweep are wrong by in common, s; 0 for nothing.
+    pub stamp_jitter: f64,
 }
 
 /// What an update found.
@@ -151,9 +153,10 @@ pub(crate) fn update(
             return None;
         }
         let (information, gradient) = sums.spread();
-        let (information, gradient) = (
+        let (information, gradient) = without_jitter(
             information * rules.independence,
             gradient * rules.independence,
+            rules.stamp_jitter,
         );
         // Where the prediction is, seen from here: P belongs to the tangent space there.
         let back = gain::transport(&error);
@@ -173,6 +176,25 @@ pub(crate) fn update(
     }
     (*state, *P) = (x, posterior);
     Some(fit(sums, iterations, converged))
+}
+
+/// Takes out of a sweep's information what its stamps alone can explain.
+///
+/// Stamps that are late by j let the latency and the encoder's delay of this one sweep seem j longer:
+/// with `c = Λ (u_latency + u_delay)` and the prior `1/σ²` of j, what is left when j is eliminated is
+/// `Λ − c cᵀ / (uᵀ c + 1/σ²)`. Without it the jitter of each sweep turns the heading for good.
+fn without_jitter(information: Square, gradient: Tangent, sigma: f64) -> (Square, Tangent) {
+    if sigma <= 0.0 {
+        return (information, gradient);
+    }
+    let both = [at::LATENCY, at::ENCODER_DELAY];
+    let c: Tangent = information.column(at::LATENCY) + information.column(at::ENCODER_DELAY);
+    let pull: f64 = both.iter().map(|&i| gradient[i]).sum();
+    let total = both.iter().map(|&i| c[i]).sum::<f64>() + 1.0 / (sigma * sigma);
+    (
+        information - c * c.transpose() / total,
+        gradient - c * (pull / total),
+    )
 }
 
 fn fit(sums: Sums, iterations: usize, converged: bool) -> Fit {
@@ -247,4 +269,41 @@ fn sums(
         sums.n_inliers -= usize::from(across.iter().all(|n| n.dot(&off).powi(2) < 4.0 * s2));
     }
     sums
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::state::DIM;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn jitter_is_eliminated_like_a_state_of_its_own(
+            rows in prop::collection::vec(-1.0..1.0_f64, DIM * 40),
+            errors in prop::collection::vec(-1.0..1.0_f64, 40),
+        ) {
+            let sigma = 0.3;
+            let H = nalgebra::SMatrix::<f64, 40, DIM>::from_column_slice(&rows);
+            let e = nalgebra::SVector::<f64, 40>::from_column_slice(&errors);
+            let h = H.column(at::LATENCY) + H.column(at::ENCODER_DELAY);
+            // The residuals' covariance with the jitter in it.
+            let S = nalgebra::SMatrix::<f64, 40, 40>::identity() + h * h.transpose() * (sigma * sigma);
+            let Some(W) = S.try_inverse() else { return Err(TestCaseError::reject("singular")) };
+            let (information, gradient) =
+                without_jitter(H.transpose() * H, H.transpose() * e, sigma);
+            prop_assert!((information - H.transpose() * W * H).norm() < 1e-8);
+            prop_assert!((gradient - H.transpose() * W * e).norm() < 1e-8);
+        }
+    }
+
+    #[test]
+    fn stamps_that_are_exact_leave_all_information() {
+        let information = Square::identity();
+        let gradient = Tangent::repeat(1.0);
+        assert_eq!(
+            without_jitter(information, gradient, 0.0),
+            (information, gradient)
+        );
+    }
 }

@@ -42,6 +42,7 @@ pub(crate) struct KalmanSettings {
     spacing: f64,
     max_iterations: usize,
     independence: f64,
+    stamp_jitter: f64,
     edges: bool,
     axis: [f64; 3],
     pose_interval: f64,
@@ -77,6 +78,7 @@ impl From<KalmanSettings> for core::Settings {
             spacing: s.spacing,
             max_iterations: s.max_iterations,
             independence: s.independence,
+            stamp_jitter: s.stamp_jitter,
             edges: s.edges,
             axis: s.axis.into(),
             pose_interval: s.pose_interval,
@@ -232,6 +234,15 @@ impl KalmanFilter {
     /// Hands out the poses predicted since the last update as they are.
     fn release(&mut self) {
         self.0.release();
+    }
+
+    /// Corrects the state by a velocity of zero; returns whether the carrier can be at rest.
+    fn rest(&mut self, sigma: f64) -> PyResult<bool> {
+        if !(sigma > 0.0 && sigma.is_finite()) {
+            let message = format!("sigma: expected a finite number above zero, got {sigma}");
+            return Err(PyValueError::new_err(message));
+        }
+        Ok(self.0.rest(sigma))
     }
 
     /// Corrected poses since this was asked last: times, positions, quaternions.

@@ -14,6 +14,9 @@ if TYPE_CHECKING:
 
     from bentwing.trajectory import Trajectory
 
+    Array = NDArray[np.float64]
+    Pose = tuple[Array, Array]
+
 _QUANTILE = 1.959963984540054
 """Of the normal distribution at 97.5 %."""
 
@@ -23,11 +26,12 @@ def pose_errors_since(
 ) -> NDArray[np.float64]:
     """Errors of an estimate that agrees with the truth at a time of reference, but for the tilt.
 
-    An odometry chooses position and heading of its frame, and measures what is up.
+    An odometry chooses position and heading of its frame, and measures what is up. The estimate's own
+    error at the reference is in all of the errors then; see `pose_errors_from`, where it is not.
 
     Parameters
     ----------
-    reference : s, at which positions and headings agree: that of take-off
+    reference : s, at which positions and headings agree
     times : (K,) s, within both
 
     Returns
@@ -36,8 +40,28 @@ def pose_errors_since(
     """
     at, quat = truth.interpolate(np.array([reference]))
     there, estimated = estimate.interpolate(np.array([reference]))
+    return pose_errors_from((there[0], estimated[0]), (at[0], quat[0]), estimate, truth, times)
+
+
+def pose_errors_from(
+    anchor: Pose, true_anchor: Pose, estimate: Trajectory, truth: Trajectory, times: Array
+) -> Array:
+    """Errors of an estimate whose frame is that of something whose pose it takes as exact.
+
+    Parameters
+    ----------
+    anchor : position (3,), m, and quaternion (4,) in the frame of the estimate, of what its frame hangs
+        on: the lidar, or its motor, as the map begins
+    true_anchor : the same in the frame of the truth; of the rotation the heading counts
+    times : (K,) s, within both
+
+    Returns
+    -------
+    (K, 6) rotation, rad, and translation, m: `R_estimate = Exp(e) R_true`, map frame
+    """
+    (there, estimated), (at, quat) = anchor, true_anchor
     turn = geometry.multiply(estimated, geometry.inverse(quat))
-    heading = np.array([[0.0, 0.0, turn[0, 2], turn[0, 3]]])
+    heading = np.array([[0.0, 0.0, turn[2], turn[3]]])
     heading /= np.linalg.norm(heading)
     positions, quats = truth.interpolate(times)
     positions = geometry.rotate(heading, positions - at) + there

@@ -18,8 +18,8 @@ def course(rate, length=8.0, *, moving=(), imu=True):
     if not imu:
         return Course(times, angles, None)
     rng = np.random.default_rng(3)
-    gyro = rng.normal(0.0, 0.007, (len(times), 3)) + [0.004, -0.003, 0.002]
-    accel = rng.normal(0.0, 0.1, (len(times), 3)) + [0.1, 0.2, 9.8]
+    gyro = rng.normal([0.004, -0.003, 0.002], 0.007, (len(times), 3))
+    accel = rng.normal([0.1, 0.2, 9.8], 0.1, (len(times), 3))
     if moving:
         inside = (times > moving[0]) & (times < moving[1])
         gyro[inside, 2] += 0.6

@@ -37,6 +37,8 @@ SLOW = np.r_[9:31]
 REST_SPEED, MOVING_SPEED = 0.01, 1.0
 # What one feature says beside its neighbours on the same surface, whose errors it shares.
 INDEPENDENCE = 0.25
+# By so much the stamps of a sweep are wrong in common, s, as drivers give them.
+STAMP_JITTER = 2e-4
 # Features after which a voxel is known.
 CELL_POINTS = 300
 # Least distance between the features of an update, m.
@@ -66,6 +68,7 @@ class FilterSettings:
     spacing: float
     max_iterations: int
     independence: float
+    stamp_jitter: float
     edges: bool
     axis: list[float]
     pose_interval: float
@@ -96,6 +99,7 @@ class FilterSettings:
             spacing=SPACING,
             max_iterations=settings.max_iterations,
             independence=INDEPENDENCE,
+            stamp_jitter=STAMP_JITTER,
             edges=settings.edges,
             axis=axis.tolist(),
             pose_interval=DT,
@@ -184,6 +188,21 @@ def anchored(covariance: NDArray[np.float64], state: FilterState) -> NDArray[np.
     effect[POSITION, BASE_ROTATION] = -np.cross(lever, R, axisb=0, axisc=0)
     effect[POSITION, BASE_TRANSLATION] = -R
     return np.asarray(effect @ covariance @ effect.T)
+
+
+def unlearned_delay(rate: float, mount: MotorMount, state: FilterState) -> NDArray[np.float64]:
+    """Return a covariance (31, 31) to add: as if nothing were known of the encoder's delay alone.
+
+    At a constant rate a longer delay is a turn of the motor's mount about its axis the other way. Only
+    while the rate changes are they told apart, and what is seen then is compared with a map made with
+    the wrong delay, which the filter believes: of that a second beginning from the same data takes the
+    value and not the certainty. What both together are stays known.
+    """
+    quat = np.array(state.base[1])
+    direction = np.zeros(N_STATES)
+    direction[BASE_ROTATION] = rate * geometry.rotate(quat, mount.axis)
+    direction[ENCODER_DELAY] = 1.0
+    return np.asarray(initial_std(moving=False)["latency"] ** 2 * np.outer(direction, direction))
 
 
 def _mounts(mount: Mount) -> tuple[Pose, Pose]:

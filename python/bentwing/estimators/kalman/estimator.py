@@ -18,14 +18,15 @@ from bentwing.estimators.kalman.core import (
     anchored,
     first_covariance,
     first_state,
+    unlearned_delay,
 )
-from bentwing.estimators.kalman.filter_pass import MIN_POINTS, FilterPass
+from bentwing.estimators.kalman.filter_pass import MIN_POINTS, FilterPass, Rest
 from bentwing.estimators.kalman.outcome import estimate_of
 from bentwing.estimators.kalman.settings import KalmanSettings
 from bentwing.estimators.mount import FixedMount, MotorMount, Mount, Pose, described_mount
 from bentwing.estimators.planar import refuse_planar_kind, refuse_plane
 from bentwing.estimators.segments import MAX_IMU_GAP, extrapolated, heading
-from bentwing.estimators.start import find_start
+from bentwing.estimators.start import find_start, levelling
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -80,6 +81,7 @@ class Kalman:
         self._mount = described_mount(payload)
         self._buffer = BatchBuffer()
         self._first: float | None = None
+        self._rest: Rest | None = None
         self._passes: list[FilterPass] = []
         self._begun: tuple[FilterState, NDArray[np.float64]] | None = None
         self._rehearsing = self.settings.rehearsal > 0
@@ -145,6 +147,16 @@ class Kalman:
         """Return times (K,) and covariances (K, 6, 6) of the pose after each sweep, rotation first."""
         return self._passes[-1].pose_covariances()
 
+    def anchor(self) -> tuple[float, Pose]:
+        """Return when the map begins, s, and where the motor (or the fixed lidar) is then, map frame.
+
+        This pose is exact, whatever its truth: `pose_covariances` are relative to it.
+        """
+        last = self._passes[-1]
+        at, quat = last.anchor
+        turn = levelling(np.array(last.filter.gravity))
+        return last.start, Pose(geometry.rotate(turn, at), geometry.multiply(turn, quat))
+
     @property
     def _filter_mount(self) -> Mount:
         """The mount as the filter takes it: a lidar whose rotation is ignored is fixed."""
@@ -200,6 +212,8 @@ class Kalman:
         if isinstance(self._mount, MotorMount):
             self._angle = self._first_angle(first)
         start = find_start(seen, self._imu)
+        static = start.static
+        self._rest = None if static is None else Rest(static.gyro_bias, static.accel_mean)
         mount = self._filter_mount
         state = first_state(start, mount, self._payload.lidar.latency)
         covariance = first_covariance(start, mount)
@@ -235,7 +249,7 @@ class Kalman:
             renew=self._rehearsing,
         )
         assert self._first is not None
-        return FilterPass(settings, self._first, state, anchored(covariance, state))
+        return FilterPass(settings, self._first, state, anchored(covariance, state), self._rest)
 
     def _begin_again(self) -> bool:
         """Leave the rehearsal: from the start again, with what was learned."""
@@ -243,6 +257,8 @@ class Kalman:
         assert self._begun is not None
         state = rehearsed.slow_state(self._begun[0])
         covariance = rehearsed.slow_covariance(self._begun[1], DOUBT)
+        if isinstance(mount := self._filter_mount, MotorMount):
+            covariance += unlearned_delay(rehearsed.motor_rate, mount, state)
         self._passes.append(self._new_pass(state, covariance))
         self._n_small = 0
         return True

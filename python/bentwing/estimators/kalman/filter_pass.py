@@ -4,11 +4,12 @@
 from __future__ import annotations
 
 import time
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bentwing import _core
+from bentwing import _core, geometry
 from bentwing.estimators.kalman.core import SLOW, FilterState
 from bentwing.trajectory import Trajectory
 
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bentwing.estimators.buffer import LidarStretch
-    from bentwing.estimators.kalman.core import FilterSettings
+    from bentwing.estimators.kalman.core import FilterSettings, Transform
     from bentwing.recording.batches import ImuBatch
 
     Poses = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
@@ -26,6 +27,26 @@ if TYPE_CHECKING:
 LEAST_SHARE = 5e-4
 # Fewer points are no sweep.
 MIN_POINTS = 100
+# The mean over a sweep differs from that of the rest by less, rad/s and m/s².
+MAX_REST_RATE, MAX_REST_FORCE = 0.01, 0.15
+# Of a carrier at rest, m/s.
+REST_SPEED = 3e-3
+
+
+@dataclass(frozen=True, slots=True)
+class Rest:
+    """Mean rate (3,), rad/s, and specific force (3,), m/s², of an IMU at rest."""
+
+    rate: NDArray[np.float64]
+    force: NDArray[np.float64]
+
+    def lasts(self, imu: ImuBatch) -> bool:
+        """Tell whether samples around a sweep are those of the same rest."""
+        if not len(imu.times):
+            return False
+        turned = np.linalg.norm(imu.gyro.mean(axis=0) - self.rate)
+        pushed = np.linalg.norm(imu.accel.mean(axis=0) - self.force)
+        return bool(turned < MAX_REST_RATE and pushed < MAX_REST_FORCE)
 
 
 class FilterPass:
@@ -34,6 +55,7 @@ class FilterPass:
     Parameters
     ----------
     time, state, covariance : at the start
+    rest : what the IMU says at rest, if that is how it begins
     """
 
     def __init__(
@@ -42,11 +64,15 @@ class FilterPass:
         time: float,
         state: FilterState,
         covariance: NDArray[np.float64],
+        rest: Rest | None = None,
     ) -> None:
+        self._rest = rest
         self.filter = _core.KalmanFilter(
             settings, time=time, state=state, covariance=np.ascontiguousarray(covariance)
         )
         self.start = time
+        # Of the motor, or the fixed lidar, as the map begins: what the frame hangs on.
+        self.anchor = _composed(state.pose, state.base)
         self.windows: list[dict[str, Any]] = []
         self.blind = 0.0
         self.seconds = 0.0
@@ -62,7 +88,10 @@ class FilterPass:
         return float(self.filter.time)
 
     def take(self, imu: ImuBatch, sweep: LidarStretch, stop: float) -> None:
-        """Carry the state on to `stop`, and correct it by a sweep that ends there."""
+        """Carry the state on to `stop`, and correct it by a sweep that ends there.
+
+        From a start at rest on the velocity is zero as long as the inertial samples are those of rest.
+        """
         began = time.perf_counter()
         self.filter.propagate(imu.times, imu.gyro, imu.accel, until=stop)
         if len(sweep.times) < MIN_POINTS:
@@ -75,6 +104,8 @@ class FilterPass:
             self.windows.append(record_of(stop, len(sweep.times), found))
             self._covariances.append((stop, self.filter.pose_covariance))
             self._watch_motor(sweep)
+        if self._rest is not None and not (self._rest.lasts(imu) and self.filter.rest(REST_SPEED)):
+            self._rest = None
         self._poses.append(self.filter.take_poses())
         for kept, new in zip(self._odometry, self.filter.take_odometry(), strict=True):
             kept.append(new)
@@ -149,6 +180,11 @@ def record_of(stop: float, n_points: int, found: _core.KalmanSweep) -> dict[str,
         "translation_eigenvalues": shift,
         "rotation_eigenvalues": turn,
     }
+
+
+def _composed(pose: Transform, inner: Transform) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    (translation, quat), (shift, turn) = ([np.array(part) for part in p] for p in (pose, inner))
+    return geometry.compose(translation, quat, shift), geometry.multiply(quat, turn)
 
 
 def _joined(parts: list[Poses]) -> Trajectory:

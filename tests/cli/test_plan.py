@@ -94,6 +94,10 @@ def test_the_flight_figures_are_made_again(bentwing, tmp_path):
     assert result.code == 0, result.err
     names = {path.name for path in out.iterdir()}
     figures = ("fig09a", "fig09b", "fig10", "fig11", "fig26a", "fig26b")
-    assert names == {"report.html", "flight.json", *(f"{name}.{kind}" for name in figures for kind in ("svg", "png"))}
+    assert names == {
+        "report.html",
+        "flight.json",
+        *(f"{name}.{kind}" for name in figures for kind in ("svg", "png")),
+    }
     numbers = json.loads((out / "flight.json").read_text())
     assert numbers["fig11_largest_overshoot_deg"] > 50.0

@@ -25,6 +25,7 @@ def test_the_maps_of_kaul_are_made_again(bentwing, tmp_path):
     numbers = json.loads((out / "mapping.json").read_text())
     compound, forest = numbers["compound"], numbers["forest"]
     assert compound["map"]["robust_std"] < 0.012
+    assert compound["true_map_std_m"] < 0.014
     assert compound["map"]["std"] < 1.1 * compound["best_map_std_m"]
     assert abs(compound["map"]["mean"]) < 0.003
     for flight in (compound, forest):

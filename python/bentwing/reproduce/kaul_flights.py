@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from bentwing.simulate.write import SimulatedRecording
 
 N_STATIONS = 6
-_STEP, _QUICK_STEP = np.radians([0.08, 0.2])  # between the beams of the terrestrial scanner
+_STEP, _QUICK_STEP = np.radians([0.15, 0.3])  # between the beams of the terrestrial scanner
 
 _BEST_STEP = 7  # every seventh point is enough for a distribution
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing.evaluate.against_surface import Reference, compare_with_map, read_reference
+from bentwing.evaluate.against_surface import compare_with_map, read_reference
 from bentwing.evaluate.against_track import compare_with_track
 from bentwing.evaluate.clouds import Cloud
 from bentwing.evaluate.drift_boxes import DriftBoxes, drift_boxes
@@ -45,6 +45,7 @@ class Measured:
     against_truth : drift of the open loop against the truth
     absolute : error of the trajectory in flight, against the truth
     share_tracked : of the measurements the total station tried
+    true_std : m, of the map against the true surfaces, which have no shadows
     best_std : m, of the map made with true poses and calibration, against the same reference
     terrestrial : an even sample of the terrestrial cloud, points (K, 3) m and stations (K,)
     n_terrestrial : points of it
@@ -56,6 +57,7 @@ class Measured:
     against_truth: list[DriftBoxes]
     absolute: AbsoluteError
     share_tracked: float
+    true_std: float | None
     best_std: float | None
     terrestrial: tuple[NDArray[np.float64], NDArray[np.float64]] | None
     n_terrestrial: int
@@ -80,7 +82,7 @@ def measure(flown: Flown, assignment: Assignment, *, scanned: bool) -> Measured:
         result.drift = DriftOver("odometry", "trajectory", drift_boxes(odometry, estimate))
         cloud = Cloud(flown.folder / "map.laz")
         result.spacing = point_spacing(cloud)
-    best = terrestrial = None
+    true = best = terrestrial = None
     n_terrestrial = 0
     if scanned:
         path, n_terrestrial = write_terrestrial(flown, assignment)
@@ -89,7 +91,9 @@ def measure(flown: Flown, assignment: Assignment, *, scanned: bool) -> Measured:
             reference = read_reference(path)
             result.reference_spacing = reference.spacing
             result.map = compare_with_map(cloud, reference, path=estimate)
-            best = _best_std(Cloud(best_path), reference, truth)
+            best = compare_with_map(Cloud(best_path), reference, path=truth).std
+            surfaces = read_reference(flown.files.scene)
+            true = compare_with_map(cloud, surfaces, path=estimate).std
         best_path.unlink()
         sample = Cloud(path, 400_000).sample
         terrestrial = (sample.points, sample.times - sample.times.min())
@@ -99,6 +103,7 @@ def measure(flown: Flown, assignment: Assignment, *, scanned: bool) -> Measured:
         drift_boxes(odometry, truth),
         absolute_error(estimate, truth, during=flight),
         share,
+        true,
         best,
         terrestrial,
         n_terrestrial,
@@ -114,10 +119,6 @@ def in_flight(truth: Trajectory) -> tuple[float, float]:
     """From the first to the last time away from the first place, s."""
     away = np.linalg.norm(truth.positions - truth.positions[0], axis=1) > MOVED
     return float(truth.times[away][0]), float(truth.times[away][-1])
-
-
-def _best_std(cloud: Cloud, reference: Reference, truth: Trajectory) -> float:
-    return compare_with_map(cloud, reference, path=truth).std
 
 
 def _motion(

@@ -119,6 +119,7 @@ def _numbers(measured: Measured) -> dict[str, Any]:
         "way_m": measured.way,
         "trajectory": found["trajectory"],
         "map": found["map"],
+        "true_map_std_m": measured.true_std,
         "best_map_std_m": measured.best_std,
         "spacing": found["spacing"],
         "reference_spacing": found["reference_spacing"],

@@ -32,7 +32,7 @@ from bentwing.trajectory import read_tum
 COLUMNS = (
     "scene", "seed", "flights", "length of each", "points", "links", "rejected", "between by places",
     "between in the end", "ATE, each by itself", "ATE, all as one", "map, best possible = 1",
-    "mapping", "merging", "merging over flying", "peak memory",
+    "mapping", "merging", "its processor time", "merging over flying", "peak memory",
 )  # fmt: skip
 STALL_COLUMNS = (
     "scene", "seed", "stall", "segments", "links", "after the stall, open loop", "merged", "ATE merged",
@@ -93,7 +93,8 @@ def together(scene: str, seed: int, options: argparse.Namespace, folder: Path) -
         f"{1e3 * score.before:.1f} mm", f"{1e3 * score.after:.1f} mm",
         ", ".join(f"{1e3 * ate:.1f}" for ate in score.ates) + " mm",
         f"{1e3 * score.joint:.1f} mm", f"{score.map_ratio:.3f}",
-        f"{mapping:.0f} s", f"{cost.seconds:.0f} s", f"{cost.seconds / seconds:.2f}",
+        f"{mapping:.0f} s", f"{cost.seconds:.0f} s", f"{cost.cpu:.0f} s",
+        f"{cost.seconds / seconds:.2f}",
         f"{cost.megabytes:.0f} MB",
     ]  # fmt: skip
     print(f"| {' | '.join(cells)} |", flush=True)

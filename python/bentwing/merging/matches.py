@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 # Pairs of places of two long runs that are verified, per place: what was seen once is seen again at
 # the places around it, and a verification takes a third of a second.
-_TRIED = 96
+_TRIED = 64
 _FEWEST_CANDIDATES = 2
 # Matches of two parts contradict each other if they put a place farther apart than this, m, and in
 # proportion to the time between them, m/s, in which both parts may have drifted.

@@ -112,8 +112,7 @@ def map_recording(
             if loop_closure and done != "loops":
                 _close_loops(run, part, watch, folder, threads)
                 checkpoint.save("loops", run)
-            with folder.stage("georeference"):
-                placed = _georeference(run, part, folder, asked)
+            placed = _georeference(run, part, folder, asked)
             with folder.stage("map"), watch.stage("map", part.length) as shown:
                 _write_map(run, part, shown, folder, asked, placed=placed)
             with folder.stage("report"):
@@ -169,15 +168,16 @@ def _georeference(
     run: Run, part: RecordingPart, folder: RunFolder, asked: dict[str, Any]
 ) -> Georeferenced | None:
     """Put the estimate on the Earth; a map that has no place there is still a map."""
-    if run.estimate is None:
-        return None
     estimate, gnss = run.estimate, part.payload.gnss
-    with Progress().stage("georeference", part.length) as unseen:
+    settings = GeoreferenceSettings(**asked["georeferencing"])
+    if estimate is None or (gnss is None and settings.control_points is None):
+        return None
+    with folder.stage("georeference"), Progress().stage("", part.length) as unseen:
         try:
             placed = georeference(
                 estimate.trajectory,
                 None if gnss is None else part.recording.fixes(part.start, part.duration),
-                GeoreferenceSettings(**asked["georeferencing"]),
+                settings,
                 lever_arm=(0.0, 0.0, 0.0) if gnss is None else gnss.lever_arm,
                 segments=estimate.segments,
                 reach=part.payload.lidar.max_range,

@@ -143,13 +143,15 @@ def put_on_earth(job: Job) -> Placed | None:
         given = job.prior.coordinates
         folder.record["georeference"] = None if given is None else given.record
         return given
-    gnss = part.payload.gnss
-    with folder.stage("georeference"), Progress().stage("georeference", part.length) as unseen:
+    gnss, settings = part.payload.gnss, GeoreferenceSettings(**job.asked["georeferencing"])
+    if gnss is None and settings.control_points is None:
+        return None
+    with folder.stage("georeference"), Progress().stage("", part.length) as unseen:
         try:
             placed = georeference(
                 found.trajectory,
                 None if gnss is None else part.recording.fixes(part.start, part.duration),
-                GeoreferenceSettings(**job.asked["georeferencing"]),
+                settings,
                 lever_arm=(0.0, 0.0, 0.0) if gnss is None else gnss.lever_arm,
                 segments=found.segments,
                 reach=part.payload.lidar.max_range,

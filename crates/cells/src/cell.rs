@@ -19,6 +19,8 @@ const MIN_SPREAD: f64 = 0.1;
 const FLAT: f64 = 0.45;
 /// Points are never known better than this share of the edge when beams are followed past them.
 const BLUR: f64 = 0.125;
+/// A beam so many standard deviations from the middle of a cell's points went through them.
+const CORE: f64 = 1.4;
 /// Of few points the extent is not known either.
 const FEW: f64 = 5.0;
 
@@ -117,13 +119,13 @@ pub(crate) struct Core {
 
 impl Core {
     /// Where along a ray that begins at `origin` it comes nearest to the middle of the points, if
-    /// it comes nearer than one standard deviation.
+    /// it comes nearer than `CORE`.
     pub(crate) fn crossing(&self, origin: &Vector3<f64>, direction: &Vector3<f64>) -> Option<f64> {
         let m = self.mean - origin;
         let weighted = self.inverse * direction;
         let along = m.dot(&weighted) / direction.dot(&weighted);
         let miss = m - along * direction;
-        (miss.dot(&(self.inverse * miss)) < 1.0).then_some(along)
+        (miss.dot(&(self.inverse * miss)) < CORE * CORE).then_some(along)
     }
 }
 

@@ -63,7 +63,7 @@ impl RaySample {
     }
 }
 
-/// An even hash of a number (SplitMix64).
+/// An even hash of a number (`SplitMix64`).
 fn draw(n: u64) -> u32 {
     let mut z = n.wrapping_mul(0x9E37_79B9_7F4A_7C15);
     z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);

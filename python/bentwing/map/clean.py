@@ -24,7 +24,7 @@ EDGE = 0.2  # m; a cell holds a piece of a wall, and not two of them
 MAX_CELLS = 1_500_000  # about 300 bytes each while beams are followed
 N_STEPS = 256  # of time, in the cells
 MIN_STEP = 0.5  # s; within it a spinning lidar looks everywhere about once
-RAYS_PER_SECOND = 12_000
+RAYS_PER_SECOND = 15_000
 MAX_RAYS = 4_000_000  # 32 bytes each
 # A beam that ends closer to a surface may have been stopped by it, had the trajectory been exact.
 MARGIN = 2 * EDGE

@@ -22,6 +22,14 @@ from bentwing.errors import (
     RecordingError,
 )
 from bentwing.estimators.kalman import KalmanSettings
+from bentwing.estimators.kalman.core import (
+    BASE_ROTATION,
+    ENCODER_DELAY,
+    first_state,
+    unlearned_delay,
+)
+from bentwing.estimators.kalman.filter_pass import Rest
+from bentwing.estimators.start import find_start
 from bentwing.evaluate.trajectory import absolute_error
 from bentwing.preprocess import preprocess
 from bentwing.recording import ImuBatch, LidarBatch, Payload, Recording
@@ -29,6 +37,9 @@ from bentwing.simulate import Scenario, simulate
 from bentwing.trajectory import read_tum
 
 LENGTH = 22.0
+IMU_AT_REST = ImuBatch(
+    np.arange(300) * 0.005, np.zeros((300, 3)), np.tile([0.0, 0.0, 9.80665], (300, 1))
+)
 
 
 def fed(folder, *, until=LENGTH, change=lambda b: b, settings=None):
@@ -63,6 +74,39 @@ def test_a_turning_lidar_is_followed_to_a_centimetre(turned):
     assert error.position.rmse < 0.012
     assert error.position.maximum < 0.04
     assert not estimate.warnings
+
+
+def test_at_rest_the_position_stays_before_the_motor_has_turned(turned):
+    """A band of 30° hardly holds it; the inertial samples alone lose centimetres within a second."""
+    _, estimate, _ = turned
+    times = estimate.trajectory.times
+    rest = estimate.trajectory.positions[times < times[0] + 3.0]
+    assert np.ptp(rest, axis=0).max() < 0.008
+
+
+def test_a_rest_is_over_as_soon_as_the_inertial_samples_change():
+    rest = Rest(np.array([0.01, 0.0, -0.01]), np.array([0.1, 0.0, 9.8]))
+    rng = np.random.default_rng(0)
+    times = np.arange(20) * 0.005
+    gyro = rng.normal(rest.rate, 0.005, (20, 3))
+    accel = rng.normal(rest.force, 0.1, (20, 3))
+    assert rest.lasts(ImuBatch(times, gyro, accel))
+    assert not rest.lasts(ImuBatch(times, gyro + np.array([0.0, 0.0, 0.03]), accel))
+    assert not rest.lasts(ImuBatch(times, gyro, accel + np.array([0.0, 0.0, 0.4])))
+    assert not rest.lasts(ImuBatch(times[:0], gyro[:0], accel[:0]))
+
+
+def test_a_delay_that_is_not_learned_turns_the_motor_the_other_way(turned):
+    """Together with the turn of the mount it leaves the lidar where it is, at the rate of then."""
+    engine, *_ = turned
+    mount = engine._mount
+    state = first_state(find_start(IMU_AT_REST, engine._imu), mount)
+    covariance = unlearned_delay(6.0, mount, state)
+    std = np.sqrt(np.diag(covariance))
+    assert std[ENCODER_DELAY] == pytest.approx([3e-3])
+    assert std[BASE_ROTATION] == pytest.approx([0.0, 0.0, 6.0 * 3e-3])
+    assert covariance[19, 30] == pytest.approx(6.0 * 9e-6)
+    assert np.linalg.matrix_rank(covariance) == 1
 
 
 def test_the_mounts_are_found_within_what_is_stated(turned, turning):

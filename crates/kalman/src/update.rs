@@ -154,8 +154,8 @@ pub(crate) fn update(
         }
         let (information, gradient) = sums.spread();
         let (information, gradient) = without_jitter(
-            information * rules.independence,
-            gradient * rules.independence,
+            &(information * rules.independence),
+            &(gradient * rules.independence),
             rules.stamp_jitter,
         );
         // Where the prediction is, seen from here: P belongs to the tangent space there.
@@ -183,9 +183,9 @@ pub(crate) fn update(
 /// Stamps that are late by j let the latency and the encoder's delay of this one sweep seem j longer:
 /// with `c = Λ (u_latency + u_delay)` and the prior `1/σ²` of j, what is left when j is eliminated is
 /// `Λ − c cᵀ / (uᵀ c + 1/σ²)`. Without it the jitter of each sweep turns the heading for good.
-fn without_jitter(information: Square, gradient: Tangent, sigma: f64) -> (Square, Tangent) {
+fn without_jitter(information: &Square, gradient: &Tangent, sigma: f64) -> (Square, Tangent) {
     if sigma <= 0.0 {
-        return (information, gradient);
+        return (*information, *gradient);
     }
     let both = [at::LATENCY, at::ENCODER_DELAY];
     let c: Tangent = information.column(at::LATENCY) + information.column(at::ENCODER_DELAY);
@@ -291,7 +291,7 @@ mod tests {
             let S = nalgebra::SMatrix::<f64, 40, 40>::identity() + h * h.transpose() * (sigma * sigma);
             let Some(W) = S.try_inverse() else { return Err(TestCaseError::reject("singular")) };
             let (information, gradient) =
-                without_jitter(H.transpose() * H, H.transpose() * e, sigma);
+                without_jitter(&(H.transpose() * H), &(H.transpose() * e), sigma);
             prop_assert!((information - H.transpose() * W * H).norm() < 1e-8);
             prop_assert!((gradient - H.transpose() * W * e).norm() < 1e-8);
         }
@@ -302,7 +302,7 @@ mod tests {
         let information = Square::identity();
         let gradient = Tangent::repeat(1.0);
         assert_eq!(
-            without_jitter(information, gradient, 0.0),
+            without_jitter(&information, &gradient, 0.0),
             (information, gradient)
         );
     }

@@ -33,10 +33,23 @@ class InputOrder:
             _table("IMU", "accel", accel, stamps),
         )
 
-    def points(self, points: ArrayLike, times: ArrayLike) -> LidarBatch:
+    def points(
+        self, points: ArrayLike, times: ArrayLike, rings: ArrayLike | None = None
+    ) -> LidarBatch:
         """Return returns of the lidar."""
         stamps = self._times("point", LidarBatch, times)
-        return LidarBatch(_table("point", "points", points, stamps), stamps)
+        table = _table("point", "points", points, stamps)
+        if rings is None:
+            return LidarBatch(table, stamps)
+        numbers = np.array(rings, dtype=np.float64, ndmin=1)
+        if numbers.shape != stamps.shape:
+            msg = f"{_named('point', stamps)}: rings: expected shape {stamps.shape}, got {numbers.shape}"
+            raise ValueError(msg)
+        _require_finite("point", "rings", numbers, stamps)
+        if len(numbers) and not (numbers.min() >= 0 and numbers.max() < 2**16):
+            msg = f"{_named('point', stamps)}: rings: expected 0 to 65535"
+            raise ValueError(msg)
+        return LidarBatch(table, stamps, ring=numbers.astype(np.uint16))
 
     def encoder(self, times: ArrayLike, angles: ArrayLike) -> EncoderBatch:
         """Return angles of the motor, one or many."""

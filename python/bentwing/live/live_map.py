@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bentwing.estimators.buffer import BatchBuffer
-    from bentwing.estimators.odometry_pass import OdometryPass
+    from bentwing.live.engine import Done
 
 # More points than this from one window add nothing to a map of one point per voxel.
 POINTS_PER_WINDOW = 200_000
@@ -57,7 +57,7 @@ class LiveMap:
         self._n_given = 0  # parts
         self._given_anything = False
 
-    def add(self, registered: OdometryPass, buffer: BatchBuffer) -> None:
+    def add(self, registered: Done, buffer: BatchBuffer) -> None:
         """Place what a window has newly registered."""
         stretch = buffer.lidar(self._until, registered.end)
         self._until = registered.end

@@ -13,8 +13,8 @@ import numpy as np
 
 from bentwing.control import StallWatch
 from bentwing.errors import UsageError
-from bentwing.estimators import Continuous
 from bentwing.live.backlog import Backlog
+from bentwing.live.engine import create_engine, estimate_at, new_data
 from bentwing.live.inputs import InputOrder
 from bentwing.live.live_map import LiveMap, MapUpdate
 from bentwing.live.prediction import StampedPose, past_pose
@@ -32,13 +32,14 @@ if TYPE_CHECKING:
 
     from bentwing.control import Stall
     from bentwing.estimators.interface import Estimate
+    from bentwing.estimators.kalman import KalmanSettings
     from bentwing.estimators.settings import ContinuousSettings
     from bentwing.recording import Batch
     from bentwing.trajectory import Trajectory
 
 
 class Odometry:
-    """Continuous-time odometry and map while the sensors deliver.
+    """Odometry and map while the sensors deliver.
 
     Feed what comes, from any thread; windows are registered in a thread of the object's own, and
     `pose` never waits for it. All times are seconds since one start of your choice, near the first
@@ -48,7 +49,8 @@ class Odometry:
     Parameters
     ----------
     payload : the sensor head, or the payload.yaml that describes it
-    settings : of the window; default: as `map_recording`
+    estimator : `continuous`, or `kalman`: a 3D lidar and an IMU, the pose corrected ten times a second
+    settings : of the estimator; default: as `map_recording`
     threads : for one registration; default: all cores
     map_spacing : m, edge of the voxels that keep one point of the map each
     max_map_points : the map never holds more, at 20 bytes each: `map_spacing` doubles instead
@@ -60,7 +62,8 @@ class Odometry:
         self,
         payload: Payload | Path | str,
         *,
-        settings: ContinuousSettings | None = None,
+        estimator: str = "continuous",
+        settings: ContinuousSettings | KalmanSettings | None = None,
         threads: int | None = None,
         map_spacing: float = 0.1,
         max_map_points: int = 5_000_000,
@@ -82,7 +85,8 @@ class Odometry:
         self._order = InputOrder()
         self._feeding = Lock()
         self._state = LiveState()
-        self._engine = Continuous(head, settings, threads)
+        self._engine = create_engine(estimator, head, settings, threads)
+        self._shift = new_data(self._engine)
         self._final: Estimate | None = None
         self._cached: tuple[Registered, Estimate] | None = None
         self._newest_point = -np.inf
@@ -119,13 +123,16 @@ class Odometry:
                 raise ValueError(msg)
             self._take(batch)
 
-    def add_points(self, points: ArrayLike, times: ArrayLike) -> None:
+    def add_points(
+        self, points: ArrayLike, times: ArrayLike, rings: ArrayLike | None = None
+    ) -> None:
         """Take returns of the lidar, a scan or less.
 
         Parameters
         ----------
         points : (N, 3), m, lidar frame
         times : (N,), s, lidar clock, non-decreasing, not before what was added last
+        rings : (N,), beam numbers of a multi-beam lidar, for `kalman`, which is better with them
 
         Raises
         ------
@@ -133,7 +140,7 @@ class Odometry:
             If the batch cannot be used; nothing of it is taken.
         """
         with self._feeding:
-            self._take(self._order.points(points, times))
+            self._take(self._order.points(points, times, rings))
 
     def add_encoder(self, times: ArrayLike, angles: ArrayLike) -> None:
         """Take angles of the motor that turns the lidar, one or many.
@@ -154,7 +161,7 @@ class Odometry:
     def feed(self, batch: Batch) -> None:
         """Take a batch as a `Recording` streams it, to replay one."""
         if isinstance(batch, LidarBatch):
-            self.add_points(batch.points, batch.times)
+            self.add_points(batch.points, batch.times, batch.ring)
         elif isinstance(batch, ImuBatch):
             self.add_imu(batch.times, batch.gyro, batch.accel)
         else:
@@ -204,7 +211,7 @@ class Odometry:
             return self._final
         registered, cached = self._state.require(), self._cached
         if cached is None or cached[0] is not registered:
-            cached = registered, self._engine.estimate(registered.done)
+            cached = registered, estimate_at(self._engine, registered.done)
             self._cached = cached
         return cached[1]
 
@@ -237,7 +244,7 @@ class Odometry:
         if self._worker.error is not None:
             return "failed"
         age = self._state.age(self._newest_point)
-        return status_of(self._state.newest, age, self._engine.settings.shift)
+        return status_of(self._state.newest, age, self._shift)
 
     @property
     def stall(self) -> Stall | None:
@@ -331,5 +338,4 @@ class Odometry:
     def _has_time(self, batch: LidarBatch) -> bool:
         self._worker.require_health()
         newest, end = self._state.newest, float(batch.times[-1])
-        shift = self._engine.settings.shift
-        return newest is None or self._backlog.has_time(end, newest.done.end, shift)
+        return newest is None or self._backlog.has_time(end, newest.done.end, self._shift)

@@ -14,7 +14,7 @@ from bentwing.estimators.odometry_pass import DT
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from bentwing.estimators.odometry_pass import OdometryPass
+    from bentwing.live.engine import Done
     from bentwing.live.imu_tail import ImuTail
     from bentwing.trajectory import Trajectory
 
@@ -59,7 +59,7 @@ class Prediction:
     Not for several threads at once.
     """
 
-    def __init__(self, registered: OdometryPass) -> None:
+    def __init__(self, registered: Done) -> None:
         self.recent = registered.recent()
         self.registered_until = registered.end - registered.globals.latency
         self._slow = registered.globals.levelled()

@@ -12,7 +12,7 @@ from bentwing.live.imu_tail import ImuTail
 from bentwing.live.prediction import MAX_EXTRAPOLATION, OVERLAP, Prediction
 
 if TYPE_CHECKING:
-    from bentwing.estimators.odometry_pass import OdometryPass
+    from bentwing.live.engine import Done
     from bentwing.live.live_map import LiveMap
     from bentwing.live.prediction import StampedPose
     from bentwing.recording.batches import ImuBatch
@@ -31,7 +31,7 @@ class Registered:
     cloud : the map of its pass
     """
 
-    done: OdometryPass
+    done: Done
     cloud: LiveMap
     prediction: Prediction = field(init=False)
 

@@ -13,8 +13,7 @@ from bentwing.live.state import REST, Registered
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from bentwing.estimators import Continuous
-    from bentwing.estimators.odometry_pass import OdometryPass
+    from bentwing.live.engine import Done, Engine, Pass
     from bentwing.live.live_map import LiveMap
     from bentwing.live.state import LiveState
     from bentwing.preprocess import Preprocessing
@@ -36,7 +35,7 @@ class Worker:
 
     def __init__(
         self,
-        engine: Continuous,
+        engine: Engine,
         preprocessing: Preprocessing,
         state: LiveState,
         new_map: Callable[[], LiveMap],
@@ -45,7 +44,7 @@ class Worker:
         self._preprocessing = preprocessing
         self._state = state
         self._new_map = new_map
-        self._mapped: OdometryPass | None = None
+        self._mapped: Pass | None = None
         self._cloud = new_map()
         self._searched = -float("inf")
         self._queue: deque[Batch] = deque()
@@ -152,7 +151,7 @@ class Worker:
         self._engine.buffer.forget(span[1] - REST)
         return True
 
-    def _publish(self, done: OdometryPass) -> None:
+    def _publish(self, done: Done) -> None:
         if self._mapped is not self._engine.current:
             self._mapped, self._cloud = self._engine.current, self._new_map()
         self._cloud.add(done, self._engine.buffer)

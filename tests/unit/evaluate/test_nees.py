@@ -7,7 +7,13 @@ import numpy as np
 import pytest
 
 from bentwing import geometry
-from bentwing.evaluate.nees import levelled_covariances, nees, nees_bounds, pose_errors_since
+from bentwing.evaluate.nees import (
+    levelled_covariances,
+    nees,
+    nees_bounds,
+    pose_errors_from,
+    pose_errors_since,
+)
 from bentwing.trajectory import Trajectory
 
 RNG = np.random.default_rng(3)
@@ -44,6 +50,28 @@ def test_a_shifted_and_turned_copy_has_no_error():
     )
     errors = pose_errors_since(0.0, moved, truth, truth.times[::10])
     assert np.abs(errors).max() < 1e-9
+
+
+def test_a_frame_that_hangs_on_the_lidar_has_no_error_where_the_imu_was_thought_elsewhere():
+    """The estimate begins with a wrong mount and learns the right one: only its beginning is wrong."""
+    truth = trajectory()
+    mount = np.array([0.2, 0.1, -0.1]), geometry.exp(np.array([0.0, 0.0, 0.4]))
+    lidar = (
+        geometry.compose(truth.positions[0], truth.quats_xyzw[0], mount[0]),
+        geometry.multiply(truth.quats_xyzw[0], mount[1]),
+    )
+    turn = geometry.exp(np.array([0.0, 0.0, 1.3]))
+    quats, positions = truth.quats_xyzw.copy(), truth.positions.copy()
+    quats[:5] = geometry.multiply(geometry.exp(np.array([0.0, 0.0, 0.01])), quats[:5])
+    moved = Trajectory(
+        truth.times, geometry.rotate(turn, positions), geometry.multiply(turn, quats)
+    )
+    hung = geometry.rotate(turn, lidar[0]), geometry.multiply(turn, lidar[1])
+    errors = pose_errors_from(hung, lidar, moved, truth, truth.times[::10])
+    assert errors[0, 2] == pytest.approx(0.01)
+    assert np.abs(errors[1:]).max() < 1e-9
+    since = pose_errors_since(0.0, moved, truth, truth.times[::10])
+    assert since[-1, 2] == pytest.approx(-0.01)
 
 
 def test_a_tilted_map_is_as_wrong_as_its_covariance_says():

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
     from bentwing.estimators.buffer import LidarStretch
     from bentwing.estimators.interface import Estimate
+    from bentwing.estimators.kalman.snapshot import FilterSnapshot
     from bentwing.recording import Batch, Payload
     from bentwing.trajectory import Trajectory
 
@@ -83,6 +84,8 @@ class Kalman:
         self._first: float | None = None
         self._rest: Rest | None = None
         self._passes: list[FilterPass] = []
+        # What came before the last break.
+        self._before: list[FilterSnapshot] = []
         self._begun: tuple[FilterState, NDArray[np.float64]] | None = None
         self._rehearsing = self.settings.rehearsal > 0
         self._n_small = 0
@@ -92,8 +95,23 @@ class Kalman:
 
     def feed(self, batch: Batch) -> None:
         """Take the next batch; sweeps that have become complete are worked in."""
-        self._buffer.add(batch)
+        self.take(batch)
         self._advance(finishing=False)
+
+    def take(self, batch: Batch) -> None:
+        """Hold the next batch for `step`."""
+        self._buffer.add(batch)
+
+    def step(self, *, finishing: bool = False) -> FilterSnapshot | None:
+        """Work in one sweep that has become complete; returns what is known then, None without any.
+
+        The result is that of `feed`; `finishing` as `result` does.
+        """
+        self._require_imu(finishing=finishing)
+        while self._go_on(finishing=finishing):
+            if (current := self.current) is not None and current.windows:
+                return self._snapshot(current)
+        return None
 
     def result(self) -> Estimate:
         """Finish with what was fed so far.
@@ -125,7 +143,23 @@ class Kalman:
                 "two are needed at least"
             )
             raise NotEnoughDataError(msg)
-        return estimate_of(self._passes, self._filter_mount, self._notes, self._n_small)
+        if (current := self.current) is None:
+            return estimate_of(self._before, self._notes, self._n_small)
+        return self.estimate(self._snapshot(current))
+
+    def estimate(self, last: FilterSnapshot) -> Estimate:
+        """Return what the passes before the last break and this one say, levelled."""
+        return estimate_of([*self._before, last], self._notes, self._n_small)
+
+    @property
+    def current(self) -> FilterPass | None:
+        """The pass that is under way."""
+        return self._passes[-1] if self._passes and self._first is not None else None
+
+    @property
+    def buffer(self) -> BatchBuffer:
+        """What coming sweeps may need of the batches."""
+        return self._buffer
 
     def odometry(self) -> tuple[Trajectory, Trajectory]:
         """Return the high-rate odometry, raw and smoothed, in the frame of the first pose.
@@ -168,6 +202,9 @@ class Kalman:
         behind = mount.T_motor_lidar
         at = geometry.compose(mount.T_imu_motor.translation, quat, behind.translation)
         return FixedMount(Pose(at, geometry.multiply(quat, behind.quat_xyzw)))
+
+    def _snapshot(self, of: FilterPass) -> FilterSnapshot:
+        return of.snapshot(self._filter_mount, is_settling=self._rehearsing)
 
     def _advance(self, *, finishing: bool) -> None:
         self._require_imu(finishing=finishing)
@@ -267,6 +304,7 @@ class Kalman:
         """Forget what is before a silence; what follows begins anew."""
         del start
         self._notes.append(sentence)
+        self._before.append(self._snapshot(self._passes[-1]))
         self._buffer.cut(stop)
         self._first = None
         return True

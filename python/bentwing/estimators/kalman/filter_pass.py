@@ -11,14 +11,17 @@ import numpy as np
 
 from bentwing import _core, geometry
 from bentwing.estimators.kalman.core import SLOW, FilterState
-from bentwing.trajectory import Trajectory
+from bentwing.estimators.kalman.learned import calibration_of
+from bentwing.estimators.kalman.snapshot import FilterSnapshot, joined_poses
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bentwing.estimators.buffer import LidarStretch
     from bentwing.estimators.kalman.core import FilterSettings, Transform
+    from bentwing.estimators.mount import Mount
     from bentwing.recording.batches import ImuBatch
+    from bentwing.trajectory import Trajectory
 
     Poses = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
 
@@ -113,18 +116,32 @@ class FilterPass:
 
     def trajectory(self) -> Trajectory:
         """Return the corrected poses, 100 a second."""
-        return _joined(self._poses)
+        return joined_poses(self._poses)
 
     def odometry(self) -> tuple[Trajectory, Trajectory]:
         """Return the poses as they were known at their times, raw and smoothed."""
         raw, smoothed = self._odometry
-        return _joined(raw), _joined(smoothed)
+        return joined_poses(raw), joined_poses(smoothed)
 
     def pose_covariances(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return times (K,) and covariances (K, 6, 6) of attitude and position after the sweeps."""
         times = np.array([t for t, _ in self._covariances])
         covariances = np.array([c for _, c in self._covariances]).reshape(-1, 6, 6)
         return times, covariances
+
+    def snapshot(self, mount: Mount, *, is_settling: bool) -> FilterSnapshot:
+        """Return what has been found so far, to be read while the filter goes on."""
+        return FilterSnapshot(
+            self.start,
+            self.end,
+            np.array(self.filter.gravity),
+            calibration_of(self, mount),
+            [*self.windows],
+            [*self._poses],
+            self.blind,
+            self.seconds,
+            is_settling,
+        )
 
     def slow_state(self, start: FilterState) -> FilterState:
         """Return `start` with the biases, gravity, mounts and delays of now."""
@@ -185,10 +202,3 @@ def record_of(stop: float, n_points: int, found: _core.KalmanSweep) -> dict[str,
 def _composed(pose: Transform, inner: Transform) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     (translation, quat), (shift, turn) = ([np.array(part) for part in p] for p in (pose, inner))
     return geometry.compose(translation, quat, shift), geometry.multiply(quat, turn)
-
-
-def _joined(parts: list[Poses]) -> Trajectory:
-    if not parts:
-        return Trajectory(np.zeros(0), np.zeros((0, 3)), np.zeros((0, 4)))
-    times, positions, quats = zip(*parts, strict=True)
-    return Trajectory(np.concatenate(times), np.concatenate(positions), np.concatenate(quats))

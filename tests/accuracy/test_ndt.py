@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
 """NDT odometry where Tazir 2020 flew it, and on a real drive.
 
-The paper's mean RTE over 100 m is 0.467 m at 0.5 rad/s and 0.801 m at 1 rad/s: the bounds. Most of it is
-the attitude of the first pose, known from a single band of 30°; aligned by all poses the error is below a
-decimetre.
+The paper's mean RTE over 100 m is 0.467 m at 0.5 rad/s and 0.801 m at 1 rad/s, the bounds are two thirds
+of that. Most of it is the attitude of the first pose, known from a single band of 30°; aligned by all
+poses the error is below a decimetre.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from bentwing.trajectory import read_tum
 pytestmark = pytest.mark.slow
 
 
-@pytest.mark.parametrize(("rate", "bound"), [(0.5, 0.467), (1.0, 0.801)])
+@pytest.mark.parametrize(("rate", "bound"), [(0.5, 0.3), (1.0, 0.5)])
 def test_a_hundred_metres_over_the_town_with_a_turning_lidar(made_once, tmp_path, rate, bound):
     scenario = Scenario(
         scene="town", flight="survey", calibrated=True, motor_rate=rate, duration=104.0, seed=2

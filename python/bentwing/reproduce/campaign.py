@@ -15,7 +15,7 @@ import numpy as np
 
 from bentwing import geometry
 from bentwing.errors import InputError
-from bentwing.evaluate.alignment import associate
+from bentwing.evaluate.alignment import align, associate
 from bentwing.evaluate.trajectory import absolute_error
 from bentwing.reproduce.trials import attempt, motor_stopped, points_of, true_calibration
 from bentwing.simulate.scenario import Scenario, simulate
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 
 LOST = 2.0
 """m, of the ATE: the estimate has left the way."""
+_STRAIGHT = 0.05  # least extent of a way to its side, as a share of that along it
 _POLL = 0.3  # s, between two looks at how far the processes are
 _WORKERS = 2
 _NO_POINTS = np.zeros((0, 3), np.float32)
@@ -46,7 +47,7 @@ class Result:
     Attributes
     ----------
     trajectory : as estimated; None if the estimator gave up
-    aligned : moved onto the truth as a whole, by its mean place and attitude
+    aligned : moved onto the truth as a whole
     from_start : moved so that the first poses agree
     distances : (N,) m, from the truth at its stamps `distance_times`, when the positions are aligned
     points : (P, 3) float32, m, some of the returns in the map by `aligned`
@@ -224,8 +225,15 @@ def fly(
 
 
 def as_a_whole(estimate: Trajectory, truth: Trajectory) -> Trajectory:
-    """Move an estimate by mean attitude and place; positions alone leave a turn about a straight way."""
+    """Move an estimate so that its positions agree best with the truth.
+
+    About a straight way positions leave a turn open: there attitudes on average agree instead. They
+    would be no good elsewhere, for an error of the mount turns them all.
+    """
     found, true = associate(estimate, truth)
+    along, beside, _ = np.linalg.svd(true.positions - true.positions.mean(axis=0), compute_uv=False)
+    if beside > _STRAIGHT * along:
+        return align(found.positions, true.positions).apply(estimate)
     offsets = geometry.multiply(true.quats_xyzw, geometry.inverse(found.quats_xyzw))
     turn = geometry.mean_rotation(offsets)
     middle, aim = found.positions.mean(axis=0), true.positions.mean(axis=0)

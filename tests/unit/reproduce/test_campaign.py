@@ -85,6 +85,15 @@ def test_an_estimate_of_a_straight_way_is_moved_onto_the_truth():
         np.testing.assert_allclose(angles(back.quats_xyzw, truth.quats_xyzw), 0.0, atol=1e-7)
 
 
+def test_where_the_way_turns_a_wrong_mount_does_not_turn_the_estimate():
+    times = 0.01 * np.arange(300)
+    positions = np.stack([np.cos(times), np.sin(times), 0.1 * times], axis=1)
+    truth = Trajectory(times, positions, np.tile([0.0, 0.0, 0.0, 1.0], (300, 1)))
+    mount = geometry.exp(np.array([0.02, 0.0, 0.01]))
+    tilted = Trajectory(times, positions, geometry.multiply(truth.quats_xyzw, mount))
+    np.testing.assert_allclose(as_a_whole(tilted, truth).positions, positions, atol=1e-9)
+
+
 def result(distances):
     none = np.array(distances, np.float64)
     return Result(None, None, None, none, none, NO_POINTS, "", [], 1.0, 1.0, 1.0)

@@ -11,7 +11,9 @@ from typing import Any
 
 from griffe import Extension, Object
 
-_SECTION = re.compile(r"^(Parameters|Attributes)\n-+\n(?:(?!^\w[^\n]*\n-{3,}$).*\n?)*", re.MULTILINE)
+_SECTION = re.compile(
+    r"^(Parameters|Attributes)\n-+\n(?:(?!^\w[^\n]*\n-{3,}$).*\n?)*", re.MULTILINE
+)
 _ENTRY = re.compile(r"^(\S[^:\n]*) : (.+)$", re.MULTILINE)
 
 

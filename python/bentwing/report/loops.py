@@ -40,7 +40,7 @@ def consistency_table(walls: Thickness | None, revisits: Revisits | None) -> str
         rows.append(
             ("offset between two visits, standard deviation", f"{1e3 * revisits.std:.1f} mm", rest)
         )
-    rows.append(("against control points or a reference", DASH, "see `bentwing evaluate`"))
+    rows.append(("against control points or a reference", DASH, "see bentwing evaluate"))
     return table(("measure", "median", "spread"), rows, numbers=frozenset({1}))
 
 

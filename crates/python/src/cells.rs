@@ -49,6 +49,7 @@ impl MapSurvey {
     }
 
     /// Adds points with the unit directions, lengths and times of their beams.
+    #[allow(clippy::too_many_arguments, reason = "arrays by name in Python")]
     #[pyo3(signature = (points, *, beams, ranges, times, doubtful, threads=0))]
     fn add(
         &mut self,
@@ -67,7 +68,7 @@ impl MapSurvey {
         require_rows("beams", beams.len(), n)?;
         let survey = self.0.as_mut().ok_or_else(finished)?;
         in_pool(py, threads, || {
-            survey.add(points, beams, ranges, times, doubtful)
+            survey.add(points, beams, ranges, times, doubtful);
         })
     }
 

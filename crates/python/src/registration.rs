@@ -114,7 +114,8 @@ impl Surfels {
             set.normals.extend(vectors(normals));
             let matrices = covariances.iter().map(|c| Matrix3::from_row_slice(c));
             set.covariances.extend(matrices);
-            set.voxel_sizes.push(finite_number("voxel size", *voxel_size)?);
+            set.voxel_sizes
+                .push(finite_number("voxel size", *voxel_size)?);
             set.level_starts.push(set.means.len());
         }
         set.stamps = vec![stamp; set.means.len()];

@@ -53,7 +53,7 @@ def compare(scene: str, seed: int, folder: Path, duration: float) -> None:
         print(
             f"| {scene}, {seed} | {'run' if prior == site else 'cloud'} "
             f"| {100 * found.across:.2f} cm | {100 * found.along:.2f} cm "
-            f"| {100 * found.bias:+.2f} ± {100 * found.std:.2f} cm "
+            f"| {100 * found.std:.2f} cm "
             f"| {record['appeared']} | {elapsed:.0f} s |",
             flush=True,
         )
@@ -61,15 +61,10 @@ def compare(scene: str, seed: int, folder: Path, duration: float) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Errors:
-    """Of the IMU's positions in flight (root mean square) and of the map's points, m.
-
-    A map has an offset of its own where the lidar's place along the spin axis is not known exactly: `bias` is
-    that of the localized flight's points over that of the map's.
-    """
+    """Of the IMU's positions in flight (root mean square), and of the map's points (standard deviation), m."""
 
     across: float
     along: float
-    bias: float
     std: float
 
 
@@ -85,16 +80,10 @@ def errors(localized: Path, recording: Path, site: Path, surveyed: Path) -> Erro
     axis = geometry.rotate(quats, np.tile([0.0, 0.0, 1.0], (len(quats), 1)))
     along = (off * axis).sum(axis=1)
     across = np.linalg.norm(off - along[:, None] * axis, axis=1)
-    own, other = surface(localized, recording, T), surface(site, surveyed, T)
-    return Errors(rms(across), rms(along), own.bias - other.bias, own.std)
-
-
-def surface(run: Path, recording: Path, T):
-    """Distances of a run's map from the true surfaces."""
-    truth, origin_ns = read_tum(recording / "truth_trajectory.txt")
-    points = mapped_points(run / "map.laz", origin_ns, in_flight(truth)) @ T.R.T + T.t
+    points = mapped_points(localized / "map.laz", origin_ns, flight) @ T.R.T + T.t
     scene = read_scene(recording / "truth_scene.ply")
-    return surface_error(scene.distance(np.ascontiguousarray(points))[0])
+    surface = surface_error(scene.distance(np.ascontiguousarray(points))[0])
+    return Errors(rms(across), rms(along), surface.std)
 
 
 def alignment(run: Path, recording: Path):

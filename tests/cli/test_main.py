@@ -13,6 +13,8 @@ from bentwing import pipeline, run_settings
 from bentwing.cli.commands import COMMANDS
 from bentwing.cli.main import run_command
 from bentwing.errors import BentwingError, EstimationError, RecordingError, UsageError
+from bentwing.georeference import GeoreferenceSettings
+from bentwing.map.clean import CleanSettings
 
 BENTWING = "from bentwing.cli.main import run; run()"
 
@@ -102,13 +104,17 @@ def test_options_reach_the_pipeline(called, capsys, monkeypatch):
     arguments = [
         "map", "a.mcap", "b.mcap", "--payload", "head.yaml", "-o", "out", "--map-format", "ply",
         "--map-spacing", "0.02", "--no-loop-closure", "--threads", "2", "--start", "5",
-        "--duration", "60", "--quiet",
+        "--duration", "60", "--keep-moving", "--epsg", "25832", "--control-points", "targets.csv",
+        "--quiet",
     ]  # fmt: skip
     assert run_command(arguments) == 0
     ((paths, payload, out), options) = called[0]
     assert paths == [Path("a.mcap"), Path("b.mcap")]
     assert (payload, out) == (Path("head.yaml"), Path("out"))
     options.pop("progress")
+    assert options.pop("cleaning") == CleanSettings(moving=False)
+    points = Path("targets.csv")
+    assert options.pop("georeferencing") == GeoreferenceSettings(epsg=25832, control_points=points)
     assert options == {
         "estimator": "continuous", "map_format": "ply", "map_spacing": 0.02, "loop_closure": False,
         "threads": 2, "start": 5.0, "duration": 60.0, "resume": False,

@@ -50,7 +50,10 @@ def test_the_record_of_the_run_agrees_with_its_files(mapped, office):
     record = record_of(out)
     assert record["complete"] is True
     assert set(record["files"]) == {path.name for path in out.iterdir()} - {"run.json"}
-    assert record["counts"]["map.points"] == len(read_points(out / "map.laz")) > 100_000
+    counts = record["counts"]
+    assert counts["map.written"] == len(read_points(out / "map.laz")) > 100_000
+    left_out = counts["map.mixed_pixels"] + counts["map.moving"]
+    assert counts["map.points"] - left_out == counts["map.written"]
     trajectory, _ = read_tum(out / "trajectory.txt")
     truth, _ = read_tum(office / "truth_trajectory.txt")
     assert np.ptp(trajectory.times) == pytest.approx(np.ptp(truth.times), abs=0.2)
@@ -94,7 +97,8 @@ def test_every_format_holds_the_counted_points(office, bentwing, tmp_path, kind)
     assert (result.out, result.err) == ("", "")
     points = read_points(tmp_path / "run" / f"map.{kind}")
     counts = record_of(tmp_path / "run")["counts"]
-    assert len(points) == counts["map.points"] - counts["map.thinned"] > 1000
+    left_out = counts["map.mixed_pixels"] + counts["map.moving"] + counts["map.thinned"]
+    assert len(points) == counts["map.written"] == counts["map.points"] - left_out > 1000
     assert np.abs(points).max() < 40.0  # m; the office and no more
     trajectory, _ = read_tum(tmp_path / "run" / "trajectory.txt")
     assert np.ptp(trajectory.times) == pytest.approx(9.0, abs=0.2)

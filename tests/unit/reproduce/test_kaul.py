@@ -83,6 +83,7 @@ def test_the_page_has_the_comparison_and_the_figures(tmp_path, monkeypatch):
     assert {p.name for p in (tmp_path / "out").iterdir()} == {
         "report.html",
         "only.json",
+        "fig1.png",
         "fig1.svg",
     }
     assert json.loads((tmp_path / "out" / "only.json").read_text()) == {"n": 2.0}

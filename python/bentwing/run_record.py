@@ -11,12 +11,15 @@ import platform
 from dataclasses import dataclass, fields, is_dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bentwing.atomic import TEMPORARY_SUFFIX
+from bentwing.atomic import TEMPORARY_SUFFIX, write_text
 from bentwing.errors import UsageError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
 
 FULL_HASH_LIMIT = 256 * 2**20  # bytes; larger files are hashed at both ends only
 _END = 2**20
@@ -132,3 +135,51 @@ class RecordedFolder:
         record = record or {}
         names = [*record.get("files", []), *record.get("files_of_earlier_run", [])]
         return [name for name in names if isinstance(name, str) and Path(name).name == name]
+
+
+class ResultFolder:
+    """Folder that holds one result and its record; the files of an earlier one are replaced.
+
+    Parameters
+    ----------
+    out : folder, made if it does not exist
+    of : its kind
+
+    Raises
+    ------
+    UsageError
+        If `out` is a file, cannot be made, or holds files that are not of this kind.
+    """
+
+    def __init__(self, out: Path, of: RecordedFolder) -> None:
+        self.path = Path(out)
+        self._of = of
+        self._earlier = of.claim(self.path)
+        self._files: list[str] = []
+
+    def file(self, name: str) -> Path:
+        """Path of a file that is about to be written atomically."""
+        self._files.append(name)
+        # whatever happens before the end, the folder can be told to be ours
+        files = {*self._files, *self._earlier}
+        self._write({"kind": self._of.kind, "complete": False, "files": files})
+        return self.path / name
+
+    def complete(self, inputs: Iterable[Path], content: Mapping[str, Any]) -> None:
+        """Write the record, last of all, and remove what is left of an earlier result."""
+        record = {
+            "kind": self._of.kind,
+            "complete": True,
+            "versions": versions(),
+            "inputs": [describe_input(path) for path in inputs],
+            **content,
+            "files": sorted(self._files),
+        }
+        self._write(record)
+        for name in self._earlier:
+            if name not in self._files:
+                (self.path / name).unlink(missing_ok=True)
+
+    def _write(self, record: dict[str, Any]) -> None:
+        text = json.dumps(plain(record), indent=1, allow_nan=False)
+        write_text(self.path / self._of.record, text + "\n")

@@ -3,50 +3,29 @@
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import yaml
 
 from bentwing.atomic import write_text
 from bentwing.calibrate.outcome import as_record
-from bentwing.run_record import RecordedFolder, describe_input, plain, versions
+from bentwing.run_record import RecordedFolder, ResultFolder
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
+    from pathlib import Path
 
     from bentwing.calibrate.outcome import Calibrated
 
-RECORD, PAYLOAD = "calibration.json", "payload.yaml"
-_KIND = "bentwing calibration"
-_FOLDER = RecordedFolder(RECORD, _KIND, "calibration")
+PAYLOAD = "payload.yaml"
+_FOLDER = RecordedFolder("calibration.json", "bentwing calibration", "calibration")
 
 
-class CalibrationFolder:
-    """Folder that holds one calibration; the files of an earlier one are replaced.
-
-    Parameters
-    ----------
-    out : folder, made if it does not exist
-
-    Raises
-    ------
-    UsageError
-        If `out` is a file, cannot be made, or holds files that are not of a calibration.
-    """
+class CalibrationFolder(ResultFolder):
+    """Folder that holds one calibration; see `ResultFolder`."""
 
     def __init__(self, out: Path) -> None:
-        self.path = Path(out)
-        self._earlier = _FOLDER.claim(self.path)
-        self._files: list[str] = []
-
-    def file(self, name: str) -> Path:
-        """Path of a file that is about to be written atomically."""
-        self._files.append(name)
-        # whatever happens before the end, the folder can be told to be ours
-        self._write({"kind": _KIND, "complete": False, "files": {*self._files, *self._earlier}})
-        return self.path / name
+        super().__init__(out, _FOLDER)
 
     def finish(self, found: Calibrated, inputs: Iterable[Path]) -> None:
         """Write payload.yaml and calibration.json, and remove what is left of an earlier one."""
@@ -54,19 +33,4 @@ class CalibrationFolder:
         write_text(
             self.file(PAYLOAD), yaml.safe_dump(content, sort_keys=False, default_flow_style=None)
         )
-        record = {
-            "kind": _KIND,
-            "complete": True,
-            "versions": versions(),
-            "inputs": [describe_input(path) for path in inputs if path.is_file()],
-            **as_record(found),
-            "files": sorted(self._files),
-        }
-        self._write(record)
-        for name in self._earlier:
-            if name not in self._files:
-                (self.path / name).unlink(missing_ok=True)
-
-    def _write(self, record: dict[str, Any]) -> None:
-        text = json.dumps(plain(record), indent=1, allow_nan=False)
-        write_text(self.path / RECORD, text + "\n")
+        self.complete((path for path in inputs if path.is_file()), as_record(found))

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 // The cloud of a report in the browser: WebGL 2 and nothing else, so that the page needs no network.
 "use strict";
-(() => {
-  const figure = document.getElementById("scene");
+const startScene = (figure) => {
   const canvas = figure.querySelector("canvas");
   const data = JSON.parse(figure.querySelector("script[type='application/json']").textContent);
   const gl = canvas.getContext("webgl2", { antialias: false });
@@ -195,4 +194,14 @@
   }
   new ResizeObserver(redraw).observe(canvas);
   redraw();
-})();
+};
+
+// Drawing takes seconds where there is no graphics card: the page is there first, and what nobody has
+// scrolled to costs nothing.
+new IntersectionObserver((seen, observer) => {
+  if (!seen.some((entry) => entry.isIntersecting)) return;
+  observer.disconnect();
+  const start = () => setTimeout(startScene, 0, seen[0].target);
+  if (document.readyState === "complete") start();
+  else window.addEventListener("load", start, { once: true });
+}, { rootMargin: "200px" }).observe(document.getElementById("scene"));

@@ -45,6 +45,7 @@ def opened(report):
         page.asked = []
         page.on("request", lambda r: page.asked.append(r.url))
         page.goto(report.as_uri())
+        page.locator("#scene").scroll_into_view_if_needed()
         page.wait_for_function("document.getElementById('scene').dataset.drawn > 0")
         yield page
         browser.close()

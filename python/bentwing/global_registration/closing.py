@@ -124,7 +124,12 @@ def close_loops(
         found.record["timings"] = {"surfels": collected, **found.record["timings"]}
     (closed,) = found.estimates
     if found.failure is not None:
-        sentence = f"the loops were not closed, the trajectory is open-loop: {found.failure}"
+        what = "the loops were not closed, the trajectory is open-loop"
+        if known is not None:
+            what = (
+                "the trajectory was not registered with the map, its places alone say where it is"
+            )
+        sentence = f"{what}: {found.failure}"
         closed = replace(closed, warnings=[*closed.warnings, sentence])
     return Closed(closed, found.record)
 

@@ -132,8 +132,8 @@ def points_of(
 
 def motor_stopped(lidar: Sequence[LidarBatch]) -> list[LidarBatch]:
     """Give all returns the motor's first angle, as if it stood still; none without a motor."""
-    turned = [batch for batch in lidar if batch.angles is not None and len(batch.angles)]
-    return [replace(b, angles=np.full(len(b.times), turned[0].angles[0])) for b in turned]  # type: ignore[index]
+    turned = [(b, b.angles) for b in lidar if b.angles is not None and len(b.angles)]
+    return [replace(b, angles=np.full(len(b.times), turned[0][1][0])) for b, _ in turned]
 
 
 def _pose(described: dict[str, list[float]]) -> Pose:

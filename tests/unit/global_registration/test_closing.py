@@ -153,3 +153,13 @@ def test_a_bent_trajectory_comes_to_the_map_and_the_map_stays(origin):
     assert found.record["applied"], found.record
     assert off(moved) > 0.2
     assert off(found.estimate.trajectory) < 0.004
+
+
+def test_a_registration_with_a_map_that_fails_does_not_call_the_trajectory_open_loop():
+    known = core_surfels(map_of_room(None))
+    settings = GlobalSettings(max_outer=1)
+    found = close_loops(
+        estimate(bent(truth())), scans(), PAYLOAD, settings=settings, known=known, threads=2
+    )
+    assert not found.record["applied"]
+    assert "not registered with the map" in found.estimate.warnings[0]

@@ -33,7 +33,7 @@ fn search(c: &mut Criterion) {
             group.bench_function(format!("{name}/level_{level}/mutual"), |b| {
                 b.iter(|| {
                     let nearest = pool.install(|| grid.nearest(&grid, &SEARCH));
-                    mutual_pairs(&nearest).count()
+                    mutual_pairs(&nearest, SEARCH.k).count()
                 });
             });
         }

@@ -3,17 +3,13 @@
 
 use crate::{NONE, Neighbors};
 
-/// Pairs `(a, b)`, `a < b`, of a set searched in itself in which each is in the list of the other,
-/// ordered by `a`, then by distance.
-pub fn mutual_pairs(nearest: &Neighbors) -> impl Iterator<Item = (u32, u32)> + '_ {
+/// Pairs `(a, b)`, `a < b`, of a set searched in itself in which each is among the `k` first of the
+/// other, ordered by `a`, then by distance.
+pub fn mutual_pairs(nearest: &Neighbors, k: usize) -> impl Iterator<Item = (u32, u32)> + '_ {
+    let first = move |a: u32| nearest.of(a as usize).iter().take(k).copied();
     (0u32..).take(nearest.len()).flat_map(move |a| {
-        let found = nearest
-            .of(a as usize)
-            .iter()
-            .copied()
-            .filter(move |&b| a < b);
-        found
-            .filter(move |&b| nearest.of(b as usize).contains(&a))
+        first(a)
+            .filter(move |&b| a < b && first(b).any(|c| c == a))
             .map(move |b| (a, b))
     })
 }
@@ -62,7 +58,7 @@ mod tests {
             min_time_gap: 0.3,
         };
         let nearest = grid.nearest(&grid, &search);
-        let pairs: Vec<_> = mutual_pairs(&nearest).collect();
+        let pairs: Vec<_> = mutual_pairs(&nearest, 1).collect();
         assert_eq!(pairs, [(1, 2)]);
     }
 

@@ -2,6 +2,7 @@
 #![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
+mod bend;
 mod constraints;
 mod fixed_view;
 mod global;

@@ -10,17 +10,20 @@ use bentwing_surfels::sym3;
 use bentwing_trajectory::{Head, so3};
 use nalgebra::{Matrix3, Vector3};
 
+use crate::bend::depth;
 use crate::index;
 use crate::placed::PlacedSurfel;
 
 /// The plane of a match: normal and weight from the sum of both covariances.
 #[derive(Clone, Copy, Debug)]
 pub struct MatchPlane {
-    /// Eigenvector of the smallest eigenvalue of `S_i + S_j`, in the IMU frame at the time of the
-    /// surfel, with which it turns from iteration to iteration.
+    /// Eigenvector of the smallest eigenvalue of `S_i + S_j`, towards the sensor, in the IMU frame at
+    /// the time of the surfel, with which it turns from iteration to iteration.
     normal_imu: Vector3<f64>,
     /// `ξ² = 1 / (σ_r² + λ1 (1 + q))`, m⁻².
     pub information: f64,
+    /// What the surface's bend adds to `nᵀ (μ_i − μ_j)`, m.
+    pub offset: f64,
 }
 
 impl MatchPlane {
@@ -30,14 +33,27 @@ impl MatchPlane {
     /// error of the normal counts with the way between the means. In units of the patches' own
     /// extents that way is `q = dᵀ S⁻¹ d` in the plane; the plane extrapolated so far is uncertain by
     /// `λ1 q`. Without it narrow patches far apart are too certain of the sensor's yaw.
-    pub fn new(surfel: &PlacedSurfel, other: &PlacedSurfel, range_sigma: f64) -> Self {
+    ///
+    /// `bend` is the shape operator of their surface, see the module of that name.
+    pub fn new(
+        surfel: &PlacedSurfel,
+        other: &PlacedSurfel,
+        bend: &Matrix3<f64>,
+        range_sigma: f64,
+    ) -> Self {
         let covariance = surfel.covariance + other.covariance;
         let eigen = sym3::eigen(&covariance);
         let roughness = eigen.values[0].max(0.0);
         let q = distance_in_plane(&covariance, &eigen, &(surfel.mean - other.mean));
+        let normal = if eigen.normal.dot(&surfel.normal) < 0.0 {
+            -eigen.normal
+        } else {
+            eigen.normal
+        };
         Self {
-            normal_imu: surfel.R_map_imu.tr_mul(&eigen.normal),
+            normal_imu: surfel.R_map_imu.tr_mul(&normal),
             information: 1.0 / (range_sigma * range_sigma + roughness * (1.0 + q)),
+            offset: depth(bend, &surfel.covariance) - depth(bend, &other.covariance),
         }
     }
 

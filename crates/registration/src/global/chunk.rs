@@ -4,12 +4,14 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use bentwing_neighbors::Grid;
+use bentwing_neighbors::{Grid, mutual_pairs};
 use bentwing_surfels::SurfelSet;
 use rayon::prelude::*;
 
 use super::piece::PieceState;
-use crate::matches::grid_of;
+use crate::Settings;
+use crate::bend::{Bend, bends};
+use crate::matches::{among_themselves, grid_of};
 use crate::placed::Placed;
 
 /// A stretch and where it belongs.
@@ -21,39 +23,61 @@ pub struct Chunk {
 /// The surfels of a stretch where the current trajectory puts them.
 pub struct Laid {
     pub placed: Placed,
-    /// Search grid of each level; none if nothing is searched.
+    /// What matches are found with; nothing if none are searched.
+    pub searched: Searched,
+}
+
+/// What is found once for all links of a stretch.
+#[derive(Default)]
+pub struct Searched {
+    /// Search grid of each level.
     pub grids: Vec<Grid>,
+    /// Pairs of each level within the stretch.
+    pub own_pairs: Vec<Vec<(u32, u32)>>,
+    /// How the surface bends at each surfel of all levels.
+    pub bends: Vec<Bend>,
 }
 
 impl Laid {
-    pub fn new(chunk: &Chunk, states: &[PieceState<'_>], searched: bool) -> Self {
+    /// Places the surfels of a stretch and, given settings, searches them in themselves.
+    pub fn new(chunk: &Chunk, states: &[PieceState<'_>], search: Option<&Settings>) -> Self {
         let state = &states[chunk.piece];
         let sets = std::slice::from_ref(&chunk.surfels);
         let placed = Placed::new(sets, &state.trajectory, &state.globals, &state.spline);
-        let levels = 0..if searched {
-            placed.voxel_sizes.len()
-        } else {
-            0
-        };
-        let grid = |l| grid_of(&placed.surfels[placed.level(l)], placed.voxel_sizes[l]);
-        let grids = levels.map(grid).collect();
-        Self { placed, grids }
+        let searched = search.map_or_else(Searched::default, |s| Searched::of(&placed, s));
+        Self { placed, searched }
+    }
+}
+
+impl Searched {
+    fn of(placed: &Placed, settings: &Settings) -> Self {
+        let mut found = Self::default();
+        for (level, &size) in placed.voxel_sizes.iter().enumerate() {
+            let surfels = &placed.surfels[placed.level(level)];
+            let grid = grid_of(surfels, size);
+            let nearest = among_themselves(&grid, settings);
+            let pairs = mutual_pairs(&nearest, settings.n_neighbors).collect();
+            found.own_pairs.push(pairs);
+            found.bends.extend(bends(surfels, &nearest, size));
+            found.grids.push(grid);
+        }
+        found
     }
 }
 
 /// Stretches as placed in the map, of which no more than some are held.
-pub struct Holder {
+pub struct Holder<'a> {
     laid: BTreeMap<usize, Arc<Laid>>,
     n_held: usize,
-    searched: bool,
+    search: Option<&'a Settings>,
 }
 
-impl Holder {
-    pub fn new(n_held: usize, searched: bool) -> Self {
+impl<'a> Holder<'a> {
+    pub fn new(n_held: usize, search: Option<&'a Settings>) -> Self {
         Self {
             laid: BTreeMap::new(),
             n_held,
-            searched,
+            search,
         }
     }
 
@@ -76,8 +100,8 @@ impl Holder {
             excess -= usize::from(!keep);
             keep
         });
-        let searched = self.searched;
-        let lay = |&k: &usize| (k, Arc::new(Laid::new(&chunks[k], states, searched)));
+        let search = self.search;
+        let lay = |&k: &usize| (k, Arc::new(Laid::new(&chunks[k], states, search)));
         let laid: Vec<_> = missing.par_iter().map(lay).collect();
         self.laid.extend(laid);
     }

@@ -109,8 +109,8 @@ impl Gatherer {
         scale: f64,
         mut take: impl FnMut(&Link, &LinkEquations),
     ) {
-        let mut holder = Holder::new(self.n_held, self.stale);
         let (chunks, settings, stale) = (&self.chunks, &self.settings, self.stale);
+        let mut holder = Holder::new(self.n_held, stale.then_some(settings));
         for wave in self.links.chunks_mut(WAVE) {
             let needed: BTreeSet<usize> = wave.iter().flat_map(|l| [l.a, l.b]).collect();
             holder.provide(&needed, chunks, states);

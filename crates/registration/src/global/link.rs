@@ -6,13 +6,15 @@
     reason = "only what is inlined into a dispatched function uses the machine's instructions"
 )]
 
-use bentwing_neighbors::{Search, claimed_pairs, mutual_pairs};
+use bentwing_neighbors::{Search, claimed_pairs};
 use pulp::{Simd, WithSimd};
 
 use super::chunk::Laid;
 use super::joint::{Joint, N_STAND_INS};
 use super::piece::PieceState;
+use crate::bend;
 use crate::constraints::surfel_match::{self, MatchPlane};
+use crate::matches;
 use crate::placed::PlacedSurfel;
 use crate::robust::cauchy_weight;
 use crate::rows::RowGroup;
@@ -30,18 +32,20 @@ impl LinkMatch {
     /// The match of surfel `i` of `a` with surfel `j` of `b`.
     pub fn between(a: &Laid, i: usize, b: &Laid, j: usize, range_sigma: f64) -> Self {
         let (surfel, other) = (&a.placed.surfels[i], &b.placed.surfels[j]);
+        let bend = bend::between(&a.searched.bends[i], &b.searched.bends[j]);
         Self {
             i: i as u32,
             j: j as u32,
-            plane: MatchPlane::new(surfel, other, range_sigma),
+            plane: MatchPlane::new(surfel, other, &bend, range_sigma),
         }
     }
 
-    /// Its normal and its weight.
+    /// Its normal, its weight and what the bend adds to its residual.
     #[cfg(test)]
-    pub fn plane_at(&self, a: &Laid) -> (nalgebra::Vector3<f64>, f64) {
+    pub fn plane_at(&self, a: &Laid) -> (nalgebra::Vector3<f64>, f64, f64) {
         let surfel = &a.placed.surfels[self.i as usize];
-        (self.plane.normal(surfel), self.plane.information)
+        let plane = &self.plane;
+        (plane.normal(surfel), plane.information, plane.offset)
     }
 }
 
@@ -60,7 +64,7 @@ impl Link {
     /// Nearest neighbours that found each other, on every level.
     pub fn find(&self, a: &Laid, b: &Laid, settings: &Settings) -> Vec<LinkMatch> {
         let mut found = Vec::new();
-        for level in 0..a.grids.len().min(b.grids.len()) {
+        for level in 0..a.searched.grids.len().min(b.searched.grids.len()) {
             let first = [a, b].map(|laid| laid.placed.level_starts[level] as u32);
             for (i, j) in self.pairs(a, b, level, settings) {
                 let (i, j) = ((first[0] + i) as usize, (first[1] + j) as usize);
@@ -71,24 +75,22 @@ impl Link {
     }
 
     fn pairs(&self, a: &Laid, b: &Laid, level: usize, settings: &Settings) -> Vec<(u32, u32)> {
-        let itself = self.a == self.b;
+        if self.a == self.b {
+            return a.searched.own_pairs[level].clone();
+        }
         let search = Search {
             // Of every other visit the best counterpart.
-            k: if itself { settings.n_neighbors } else { 1 },
-            max_distance: settings.max_match_distance as f32,
+            k: 1,
             // Pieces may have clocks of their own.
             min_time_gap: if self.pieces[0] == self.pieces[1] {
                 settings.min_match_gap as f32
             } else {
                 -1.0
             },
+            ..matches::search(settings)
         };
-        let nearest = b.grids[level].nearest(&a.grids[level], &search);
-        if itself {
-            mutual_pairs(&nearest).collect()
-        } else {
-            claimed_pairs(&nearest, b.grids[level].len())
-        }
+        let nearest = b.searched.grids[level].nearest(&a.searched.grids[level], &search);
+        claimed_pairs(&nearest, b.searched.grids[level].len())
     }
 }
 
@@ -230,7 +232,7 @@ impl LinkSum<'_> {
             stand_ins.fill(0.0);
             surfel_match::add_globals(&mut stand_ins[..N_GLOBALS], heads[1], other, n, -1.0);
         }
-        let residual = n.dot(&(surfel.mean - other.mean));
+        let residual = n.dot(&(surfel.mean - other.mean)) + m.plane.offset;
         let x = residual * m.plane.information.sqrt();
         let w = cauchy_weight(x, self.scale);
         rows.add(residual, w * m.plane.information);

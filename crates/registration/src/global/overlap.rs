@@ -50,7 +50,7 @@ impl Places {
 /// of each of as many groups that follow each other in time: so that different visits take part, and the
 /// number of matches grows no faster than the recording.
 pub fn links(chunks: &[Chunk], states: &[PieceState<'_>], plan: &Plan) -> Vec<(usize, usize)> {
-    let places = |c: &Chunk| Places::of(&Laid::new(c, states, false));
+    let places = |c: &Chunk| Places::of(&Laid::new(c, states, None));
     let places: Vec<Places> = chunks.par_iter().map(places).collect();
     let chosen: Vec<Vec<usize>> = (0..chunks.len())
         .into_par_iter()

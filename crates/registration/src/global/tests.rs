@@ -297,13 +297,14 @@ proptest! {
         let joint = Joint::new(&states);
         let other = usize::from(!same);
         let at = |p: usize| chunk::Chunk { piece: p, surfels: chunks[0].clone() };
-        let laid = [chunk::Laid::new(&at(0), &states, false), chunk::Laid::new(&at(other), &states, false)];
+        let laid = [chunk::Laid::new(&at(0), &states, Some(&settings())), chunk::Laid::new(&at(other), &states, Some(&settings()))];
         let found = link::LinkMatch::between(&laid[0], 2, &laid[1], j, 0.01);
         let link = link::Link {
             a: 0, b: 1, pieces: [0, other], is_near: false, matches: vec![found],
         };
-        let (n, information) = found.plane_at(&laid[0]);
-        let residual = n.dot(&(laid[0].placed.surfels[2].mean - laid[1].placed.surfels[j].mean));
+        let (n, information, offset) = found.plane_at(&laid[0]);
+        let apart = laid[0].placed.surfels[2].mean - laid[1].placed.surfels[j].mean;
+        let residual = n.dot(&apart) + offset;
         prop_assume!(residual.abs() > 1e-3);
         let part = gather::sum(&link, &link.matches, [&laid[0], &laid[1]], &states, &joint, 1e12);
         let mut equations = NormalEquations::new(joint.n_controls());

@@ -29,9 +29,14 @@ const HALF_A_CIRCLE: f64 = 1.0 / 3.0;
 /// Surfels per parallel task.
 const SURFELS_PER_TASK: usize = 256;
 
-/// The shape operator of a surface in the map frame, 1/m, positive where it bends away from the
-/// sensor; `None` where nothing tells.
-pub type Bend = Option<Matrix3<f64>>;
+/// How a surface bends.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Bend {
+    /// Shape operator in the map frame, 1/m, positive where it bends away from the sensor.
+    pub shape: Matrix3<f64>,
+    /// What tells it: squared distances of the neighbours, m².
+    pub known: f64,
+}
 
 /// How the surface bends at each surfel of a level that was searched in itself.
 pub fn bends(surfels: &[PlacedSurfel], nearest: &Neighbors, voxel_size: f64) -> Vec<Bend> {
@@ -45,12 +50,13 @@ pub fn bends(surfels: &[PlacedSurfel], nearest: &Neighbors, voxel_size: f64) -> 
     found
 }
 
-/// The bend between two surfels.
+/// The shape operator between two surfels.
 pub fn between(a: &Bend, b: &Bend) -> Matrix3<f64> {
-    match (a, b) {
-        (Some(a), Some(b)) => (a + b) * 0.5,
-        (Some(one), None) | (None, Some(one)) => *one,
-        (None, None) => Matrix3::zeros(),
+    let known = a.known + b.known;
+    if known > 0.0 {
+        (a.shape * a.known + b.shape * b.known) / known
+    } else {
+        Matrix3::zeros()
     }
 }
 
@@ -74,9 +80,7 @@ fn bend_at<'a>(
     let ridge = (NORMAL_SIGMA * voxel_size / EXPECTED).powi(2);
     let [mut uu, mut uv, mut vv] = [ridge, 0.0, ridge];
     let mut turned = Vector3::zeros();
-    let mut alone = true;
     for other in neighbors {
-        alone = false;
         let (away, turn) = (other.mean - surfel.mean, other.normal - surfel.normal);
         let (x, y) = (u.dot(&away), v.dot(&away));
         let (a, b) = (u.dot(&turn), v.dot(&turn));
@@ -86,9 +90,14 @@ fn bend_at<'a>(
         turned += Vector3::new(x * a, y * a + x * b, y * b);
     }
     let normal = Matrix3::new(uu, uv, 0.0, uv, uu + vv, uv, 0.0, uv, vv);
-    let w = if alone { None } else { normal.cholesky() }?.solve(&turned);
+    let Some(w) = normal.cholesky().map(|l| l.solve(&turned)) else {
+        return Bend::default();
+    };
     let (u_t, v_t) = (u.transpose(), v.transpose());
-    Some(u * u_t * w.x + (u * v_t + v * u_t) * w.y + v * v_t * w.z)
+    Bend {
+        shape: u * u_t * w.x + (u * v_t + v * u_t) * w.y + v * v_t * w.z,
+        known: uu + vv - 2.0 * ridge,
+    }
 }
 
 #[cfg(test)]
@@ -145,7 +154,7 @@ mod tests {
             let others: Vec<_> = around.iter().map(|&(a, z)| on_trunk(radius, a, z)).collect();
             let seen: f64 = others.iter().map(|o| o.mean.y * o.mean.y).sum();
             prop_assume!(seen > 0.01);
-            let bend = bend_at(&surfel, others.iter(), VOXEL).ok_or_else(|| TestCaseError::fail("none"))?;
+            let bend = bend_at(&surfel, others.iter(), VOXEL).shape;
             // The prior takes a share that the extent of what was seen tells.
             let ridge = (NORMAL_SIGMA * VOXEL / EXPECTED).powi(2);
             prop_assert!((bend[(1, 1)] * radius - 1.0).abs() < 0.02 + 3.0 * ridge / seen, "{bend}");
@@ -158,7 +167,7 @@ mod tests {
             let [u, v] = so3::orthogonal_pair(&normal);
             let others: Vec<_> = offsets.iter().map(|o| placed(u * o[0] + v * o[1], normal)).collect();
             let bend = bend_at(&placed(Vector3::zeros(), normal), others.iter(), VOXEL);
-            prop_assert!(bend.is_some_and(|b| b.norm() < 1e-9));
+            prop_assert!(bend.shape.norm() < 1e-9 && bend.known > 0.0);
         }
 
         /// Narrow and wide strips of one trunk: behind the surface by as much as their points say.
@@ -173,12 +182,14 @@ mod tests {
     }
 
     #[test]
-    fn alone_nothing_is_known() {
-        let surfel = on_trunk(0.2, 0.0, 0.0);
-        assert!(bend_at(&surfel, [].into_iter(), VOXEL).is_none());
-        assert_eq!(between(&None, &None), Matrix3::zeros());
-        let one = Matrix3::identity();
-        assert_eq!(between(&None, &Some(one)), one);
-        assert_eq!(between(&Some(one * 3.0), &Some(one)), one * 2.0);
+    fn what_knows_more_counts_more() {
+        let alone = bend_at(&on_trunk(0.2, 0.0, 0.0), [].into_iter(), VOXEL);
+        assert_eq!(between(&alone, &alone), Matrix3::zeros());
+        let of = |shape: f64, known| Bend {
+            shape: Matrix3::identity() * shape,
+            known,
+        };
+        assert_eq!(between(&alone, &of(5.0, 0.1)), of(5.0, 0.0).shape);
+        assert_eq!(between(&of(1.0, 1.0), &of(5.0, 3.0)), of(4.0, 0.0).shape);
     }
 }

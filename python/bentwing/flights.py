@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bentwing.errors import UsageError
+from bentwing.map.clean import CleanSettings
 from bentwing.merging import merge_into, open_sources
 from bentwing.merging.source import distinct_names
 from bentwing.merging.writing import MapOptions
@@ -33,6 +34,7 @@ def map_flights(
     *,
     map_format: str = "laz",
     map_spacing: float = 0.0,
+    cleaning: CleanSettings | None = None,
     threads: int | None = None,
     resume: bool = False,
     progress: Progress | None = None,
@@ -60,17 +62,24 @@ def map_flights(
             )
             raise UsageError(msg)
     watch, names = progress or Progress(), flight_names(flights)
+    asked = MapOptions(map_format, map_spacing, threads, cleaning or CleanSettings())
     settings = {
         "flights": {n: [str(p.resolve()) for p in f] for n, f in zip(names, flights, strict=True)},
-        **plain(MapOptions(map_format, map_spacing, threads)),
+        **plain(asked),
         **plain(options),
     }
     with RunFolder(Path(out), settings) as folder:
         runs = []
+        same = {
+            **options,
+            "map_format": map_format,
+            "map_spacing": map_spacing,
+            "cleaning": asked.cleaning,
+        }
         for name, paths in zip(names, flights, strict=True):
             run = Path(out) / RUNS / name
             runs.append(run)
-            if resume and _is_mapped(run, paths, payload, {**options, "map_format": map_format}):
+            if resume and _is_mapped(run, paths, payload, same):
                 watch.note(f"{name}: is mapped already")
                 continue
             watch.note(f"{name}:")
@@ -81,14 +90,13 @@ def map_flights(
                     run,
                     map_format=map_format,
                     map_spacing=map_spacing,
+                    cleaning=asked.cleaning,
                     threads=threads,
                     resume=resume,
                     progress=watch,
                     **options,
                 )
-        return merge_into(
-            folder, open_sources(runs), MapOptions(map_format, map_spacing, threads), watch
-        )
+        return merge_into(folder, open_sources(runs), asked, watch)
 
 
 def flight_names(flights: Sequence[Sequence[Path]]) -> list[str]:

@@ -70,6 +70,30 @@ def test_the_flights_agree_to_a_centimetre(flights, merged):
     assert score.map_ratio < 1.3
 
 
+def test_the_map_is_clean_and_tells_the_run_of_every_point(merged):
+    import laspy
+
+    one = merged.out / "map_1"
+    record, table = json.loads((one / "run.json").read_text()), laspy.read(one / "map.laz")
+    counts = record["counts"]
+    assert counts["map.mixed_pixels"] > 100
+    assert (
+        counts["map.written"]
+        == len(table)
+        == counts["map.points"] - (counts["map.mixed_pixels"] + counts["map.moving"])
+    )
+    assert np.isfinite(table["thickness"]).mean() > 0.9
+    ids, times = np.asarray(table["run_id"]), np.asarray(table.gps_time)
+    for number, run in enumerate(record["runs"]):
+        lines = (one / run["trajectory"]).read_text().splitlines()
+        unix = [float(lines[k].split()[0]) for k in (1, -1)]  # behind the comment
+        begins = times[ids == number].min() - times.min()
+        expected = (run["start_ns"] - min(r["start_ns"] for r in record["runs"])) / 1e9
+        assert begins == pytest.approx(expected, abs=1.0)
+        assert np.ptp(times[ids == number]) <= unix[1] - unix[0] + 0.1
+    assert set(ids) == {0, 1}
+
+
 def test_every_pair_of_places_is_listed_with_its_reason(merged):
     listed = merged.record["merging"]["candidates"]
     accepted = [c for c in listed if c["accepted"]]

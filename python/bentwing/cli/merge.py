@@ -20,6 +20,15 @@ def merge_command(
     map_spacing: Annotated[
         float, typer.Option(help="Keep one point per voxel of this edge in metres; 0 keeps all.")
     ] = 0.0,
+    keep_moving: Annotated[
+        bool,
+        typer.Option(
+            "--keep-moving", help="Keep what beams went through at other times or in other runs."
+        ),
+    ] = False,
+    keep_mixed: Annotated[
+        bool, typer.Option("--keep-mixed", help="Keep returns between two surfaces.")
+    ] = False,
     threads: Annotated[int | None, typer.Option(help="Default: all cores.", min=1)] = None,
     quiet: Annotated[bool, typer.Option("--quiet", help="Say nothing but errors.")] = False,
 ) -> None:
@@ -28,6 +37,7 @@ def merge_command(
     Runs that have no place in common become maps of their own, in folders of their own.
     """
     # slow to import, so only when it is needed
+    from bentwing.map.clean import CleanSettings
     from bentwing.merging import merge
     from bentwing.progress import create_progress
 
@@ -36,6 +46,7 @@ def merge_command(
         out,
         map_format=map_format,
         map_spacing=map_spacing,
+        cleaning=CleanSettings(mixed_pixels=not keep_mixed, moving=not keep_moving),
         threads=threads,
         progress=create_progress(quiet=quiet),
     )

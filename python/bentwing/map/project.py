@@ -34,7 +34,6 @@ def project(
     calibration: Calibration,
     *,
     segments: Sequence[tuple[float, float]] = (),
-    run_id: int = 0,
     threads: int | None = None,
     counts: dict[str, int] | None = None,
 ) -> Iterator[MapChunk]:
@@ -47,7 +46,6 @@ def project(
     calibration : latency and mount of the lidar
     segments : first and last time of each stretch of the trajectory without a break, s; default:
         all of it is one
-    run_id : number of the run in a map of several
     threads : default: all cores
     counts : receives `map.points`, `map.outside_trajectory` and `map.not_finite`
 
@@ -79,7 +77,7 @@ def project(
                 batch.ring,
                 _directions(points - origins, ranges),
                 mixed_pixels(batch.points, batch.times, batch.ring),
-                run_id=np.full(len(ranges), run_id, np.uint16),
+                run_id=np.zeros(len(ranges), np.uint16),
             )
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from bentwing.errors import UsageError
 from bentwing.global_registration import Budget, GlobalSettings
 from bentwing.global_registration.stretches import length_of
+from bentwing.map.clean import CleanSettings
 from bentwing.map.writer import require_format
 from bentwing.merging.describe import describe_matches, describe_parts_of
 from bentwing.merging.maps import Ingredients, MergedMap, make_maps
@@ -50,6 +51,7 @@ def merge(
     *,
     map_format: str = "laz",
     map_spacing: float = 0.0,
+    cleaning: CleanSettings | None = None,
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> Merged:
@@ -66,6 +68,8 @@ def merge(
     out : folder for the result; see `RunFolder` for what may be there already
     map_format : one of `MAP_FORMATS`
     map_spacing : m, edge of the voxels that keep one point each; 0 keeps all points
+    cleaning : what is left out of the map; default: mixed pixels and what moved, while a run was
+        flown or between the runs
     threads : default: all cores
     progress : what to tell the user meanwhile; default: nothing
 
@@ -80,7 +84,7 @@ def merge(
             f"{out}: is one of the runs that are to be merged; choose another folder for the result"
         )
         raise UsageError(msg)
-    options = MapOptions(map_format, map_spacing, threads)
+    options = MapOptions(map_format, map_spacing, threads, cleaning or CleanSettings())
     settings = {"runs": [str(s.folder.resolve()) for s in sources], **as_settings(options)}
     with RunFolder(Path(out), settings) as folder:
         return merge_into(folder, sources, options, progress or Progress())

@@ -11,6 +11,7 @@ import numpy as np
 
 from bentwing import geometry
 from bentwing.clock import NS_PER_S
+from bentwing.map.clean import CleanSettings, clean
 from bentwing.map.project import project
 from bentwing.map.thin import thin
 from bentwing.map.writer import open_map
@@ -39,6 +40,7 @@ class MapOptions:
     map_format: str
     map_spacing: float
     threads: int | None
+    cleaning: CleanSettings
 
 
 def write_trajectories(
@@ -95,30 +97,44 @@ def write_map(
     options: MapOptions,
     watch: Progress,
 ) -> None:
-    """Write the points of all runs into one map.
+    """Write the cleaned points of all runs into one map.
 
-    In the file points have the times of their recordings. In the sample for the report, and in the
-    trajectory of `run`, the runs follow each other.
+    In the file points have the times of their recordings. Where they are cleaned, in the sample for the
+    report, and in the trajectory of `run`, the runs follow each other.
     """
     origin_ns = min(source.start_ns for source in sources)
     offsets = _offsets(estimates)
+    starts = [(source.start_ns - origin_ns) / NS_PER_S for source in sources]
+    late = np.subtract(starts, offsets)
     counts = folder.record["counts"]
     total: Counter[str] = Counter()
 
-    def chunks() -> Iterator[MapChunk]:
-        for source, estimate, offset in zip(sources, estimates, offsets, strict=True):
+    def placed() -> Iterator[MapChunk]:
+        for number, (source, estimate, offset) in enumerate(
+            zip(sources, estimates, offsets, strict=True)
+        ):
             own: dict[str, int] = {}
-            late = (source.start_ns - origin_ns) / NS_PER_S
             for chunk in _placed(source, estimate, own, options.threads, watch):
-                run.sample.add(replace(chunk, times=chunk.times + offset))
-                yield replace(chunk, times=chunk.times + late)
+                run_id = np.full(len(chunk), number, np.uint16)
+                yield replace(chunk, times=chunk.times + offset, run_id=run_id)
             total.update(own)
 
     path = folder.file(f"map.{options.map_format}")
+    chunks = clean(
+        placed(),
+        path,
+        duration=offsets[-1] + float(estimates[-1].trajectory.times[-1]),
+        settings=options.cleaning,
+        counts=counts,
+        record=folder.record["map"],
+        threads=options.threads,
+    )
+    chunks = thin(chunks, options.map_spacing, counts)
     with open_map(path, options.map_format, origin_ns) as writer:
-        for chunk in thin(chunks(), options.map_spacing, counts):
-            writer.write(chunk)
+        for chunk in run.sample.watch(chunks):
+            writer.write(replace(chunk, times=chunk.times + late[chunk.run_id]))
     counts.update(total)
+    counts["map.written"] = writer.n_points
 
 
 def one_after_the_other(estimates: Sequence[Estimate]) -> Trajectory:

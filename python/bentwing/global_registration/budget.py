@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 # Bytes of a surfel as it is kept, as it is placed with its search grid, and of a match.
 SURFEL = 144
-PLACED = 400
+PLACED = 500
 MATCH = 48
 # Matches of a surfel with its own stretch, and with each other visit (measured: at most).
 OWN_MATCHES = 1.0

@@ -103,6 +103,7 @@ fn bend_at<'a>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::constraints::surfel_match::MatchPlane;
     use bentwing_trajectory::Basis;
     use proptest::prelude::*;
 
@@ -178,6 +179,33 @@ mod tests {
             bend[(1, 1)] = 1.0 / radius;
             let expected = radius - mean.x;
             prop_assert!((depth(&bend, &covariance) - expected).abs() < 0.02 * expected);
+        }
+    }
+
+    /// Seen from afar in its whole width and from nearby in a piece, a trunk stands where it stands,
+    /// whichever observation comes first.
+    #[test]
+    fn wide_and_narrow_observations_of_a_trunk_agree() {
+        let radius = 0.2;
+        let of_width = |share: f64| {
+            let (mean, mut covariance) = strip(radius, share * radius);
+            covariance[(2, 2)] = 0.01; // as tall as a voxel
+            let mut surfel = placed(mean, Vector3::x());
+            surfel.covariance = covariance;
+            surfel
+        };
+        let (far, near) = (of_width(0.95), of_width(0.5));
+        let mut bend = Matrix3::zeros();
+        bend[(1, 1)] = 1.0 / radius;
+        for (one, other, sign) in [(&far, &near, 1.0), (&near, &far, -1.0)] {
+            let plane = MatchPlane::new(one, other, &bend, 0.01);
+            let error = plane.normal(one).dot(&(one.mean - other.mean));
+            assert!(sign * error < -0.02, "{error}");
+            assert!(
+                (error + plane.offset).abs() < 1e-3,
+                "{error} {}",
+                plane.offset
+            );
         }
     }
 

@@ -5,8 +5,8 @@
 //! (Nocedal and Wright 2006, section 4.1). Lengths are measured in units of the diagonal of `JᵀΩJ`,
 //! so that radians and metres compare.
 
-use faer::MatMut;
-use nalgebra::Isometry3;
+use faer::{Mat, MatMut};
+use nalgebra::{Isometry3, Matrix6};
 
 use crate::GraphError;
 use crate::blocks::Structure;
@@ -14,6 +14,7 @@ use crate::cholesky::Cholesky;
 use crate::equations::{Equations, cost};
 use crate::graph::PoseGraph;
 use crate::poses::corrected;
+use crate::terms::LinkAt;
 
 /// Steps below this, rad and m, change nothing that is known.
 const NEGLIGIBLE_STEP: f64 = 1e-9;
@@ -94,6 +95,43 @@ impl<'a> Minimizer<'a> {
             best.converged |= radius < SMALLEST_REGION * legs.full_length;
         }
         Ok(best)
+    }
+
+    /// Covariances `J Σ Jᵀ` of the residuals of `links` that the poses' covariance Σ leaves, where
+    /// `weights` tells the links that made the poses.
+    ///
+    /// # Errors
+    /// When the links do not determine all poses.
+    pub fn uncertainties(
+        &mut self,
+        poses: &[Isometry3<f64>],
+        weights: &[f64],
+        links: &[usize],
+    ) -> Result<Vec<Matrix6<f64>>, GraphError> {
+        self.equations
+            .linearize(self.graph, self.numbers, poses, weights);
+        self.cholesky.factorize(&self.equations.matrix)?;
+        let mut columns = Mat::zeros(self.equations.gradient.len(), 6);
+        let uncertainty = |&index: &usize| {
+            let link = &self.graph.links[index];
+            let jacobians = LinkAt::new(link, poses).jacobians(link, poses);
+            let from = link.from.and_then(|from| self.numbers[from]);
+            let ends = [from, self.numbers[link.to]];
+            let free = || ends.into_iter().zip(&jacobians).filter_map(|(e, J)| Some((e?, J)));
+            columns.fill(0.0);
+            for (number, J) in free() {
+                for (r, c) in (0..6).flat_map(|r| (0..6).map(move |c| (r, c))) {
+                    columns[(6 * number + r, c)] = J[(c, r)];
+                }
+            }
+            self.cholesky.solve(columns.as_mut());
+            let mut uncertainty = Matrix6::zeros();
+            for (number, J) in free() {
+                uncertainty += J * Matrix6::from_fn(|r, c| columns[(6 * number + r, c)]);
+            }
+            uncertainty
+        };
+        Ok(links.iter().map(uncertainty).collect())
     }
 
     /// Linearizes and solves.

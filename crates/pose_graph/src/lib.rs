@@ -9,10 +9,13 @@ mod dogleg;
 mod equations;
 mod error;
 mod graph;
+mod motion;
 mod poses;
+mod readmission;
 mod robust;
 mod solve;
 mod terms;
+mod voting;
 #[cfg(test)]
 mod testing;
 

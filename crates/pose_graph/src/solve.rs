@@ -9,7 +9,8 @@ use crate::dogleg::{Minimizer, Minimum, Stop};
 use crate::equations::{chi2s, cost, structure};
 use crate::graph::PoseGraph;
 use crate::poses::numbered;
-use crate::robust::{self, Robust};
+use crate::readmission;
+use crate::robust::Robust;
 
 /// How a graph is solved.
 #[derive(Clone, Copy, Debug)]
@@ -74,31 +75,18 @@ fn minimum(
         max_iterations: settings.max_iterations,
         min_relative_decrease: settings.min_relative_decrease,
     };
+    if let Some(robust) = &settings.robust {
+        return readmission::believed(graph, numbers, stop, robust);
+    }
     let every = structure(graph, numbers, &all);
     let mut minimizer = Minimizer::new(graph, numbers, &every)?;
-    let mut relaxation = Relaxation::new(graph, numbers, &every)?;
-    let mut start =
-        |given: &[_], weights: &[f64]| cheaper(graph, given, relaxation.poses(weights)?, weights);
-    let Some(robust) = &settings.robust else {
-        let start = start(&graph.poses, &all)?;
-        return Ok((minimizer.minimize(start, &all, stop)?, all));
-    };
-    let (found, weights) = robust::anneal(graph, &mut minimizer, start, robust)?;
-    // False links join what is far apart: without them the factor is much smaller.
-    let some = structure(graph, numbers, &weights);
-    let last = Minimizer::new(graph, numbers, &some)?.minimize(found.poses, &weights, stop)?;
-    let n_iterations = found.n_iterations + last.n_iterations;
-    Ok((
-        Minimum {
-            n_iterations,
-            ..last
-        },
-        weights,
-    ))
+    let relaxed = Relaxation::new(graph, numbers, &every)?.poses(&all)?;
+    let start = cheaper(graph, &graph.poses, relaxed, &all)?;
+    Ok((minimizer.minimize(start, &all, stop)?, all))
 }
 
 /// Of two sets of poses the one that costs less.
-fn cheaper(
+pub fn cheaper(
     graph: &PoseGraph,
     given: &[Isometry3<f64>],
     relaxed: Vec<Isometry3<f64>>,

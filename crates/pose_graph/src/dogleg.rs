@@ -5,12 +5,12 @@
 //! (Nocedal and Wright 2006, section 4.1). Lengths are measured in units of the diagonal of `JᵀΩJ`,
 //! so that radians and metres compare.
 
-use faer::{Mat, MatMut};
+use faer::MatMut;
 use nalgebra::{Isometry3, Matrix6};
 
 use crate::GraphError;
 use crate::blocks::Structure;
-use crate::cholesky::Cholesky;
+use crate::cholesky::{Cholesky, Inverse};
 use crate::equations::{Equations, cost};
 use crate::graph::PoseGraph;
 use crate::poses::corrected;
@@ -111,25 +111,14 @@ impl<'a> Minimizer<'a> {
         self.equations
             .linearize(self.graph, self.numbers, poses, weights);
         self.cholesky.factorize(&self.equations.matrix)?;
-        let mut columns = Mat::zeros(self.equations.gradient.len(), 6);
+        let mut inverse = Inverse::new(&mut self.cholesky);
         let uncertainty = |&index: &usize| {
             let link = &self.graph.links[index];
             let jacobians = LinkAt::new(link, poses).jacobians(link, poses);
             let from = link.from.and_then(|from| self.numbers[from]);
-            let ends = [from, self.numbers[link.to]];
-            let free = || ends.into_iter().zip(&jacobians).filter_map(|(e, J)| Some((e?, J)));
-            columns.fill(0.0);
-            for (number, J) in free() {
-                for (r, c) in (0..6).flat_map(|r| (0..6).map(move |c| (r, c))) {
-                    columns[(6 * number + r, c)] = J[(c, r)];
-                }
-            }
-            self.cholesky.solve(columns.as_mut());
-            let mut uncertainty = Matrix6::zeros();
-            for (number, J) in free() {
-                uncertainty += J * Matrix6::from_fn(|r, c| columns[(6 * number + r, c)]);
-            }
-            uncertainty
+            let ends = [from, self.numbers[link.to]].into_iter().zip(jacobians);
+            let blocks: Vec<_> = ends.filter_map(|(end, J)| Some((end?, J.transpose()))).collect();
+            inverse.quadratic(&blocks)
         };
         Ok(links.iter().map(uncertainty).collect())
     }

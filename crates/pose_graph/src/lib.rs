@@ -14,6 +14,7 @@ mod poses;
 mod readmission;
 mod robust;
 mod solve;
+mod supernodes;
 mod terms;
 mod voting;
 #[cfg(test)]

@@ -18,8 +18,9 @@ use crate::solve::cheaper;
 use crate::terms::LinkAt;
 use crate::voting::supported;
 
-/// Rounds at most; each opens links that the one before has made credible.
-const MAX_ROUNDS: usize = 4;
+/// Medians of `rᵀΩr` by which a link that nobody vouches for may be off. Most such links are false;
+/// of true ones with Gaussian errors two in ten thousand are off by more.
+const LONELY_RATIO: f64 = 5.0;
 
 /// Finds the poses that agree best with the true links; gives them and weights of 0 or 1.
 ///
@@ -45,17 +46,16 @@ pub fn believed(
             converged: false,
         },
     };
-    for round in 1.. {
-        search.anneal(&open)?;
-        let credible = search.credible(&open)?;
-        if round == MAX_ROUNDS || credible.iter().all(|&index| open[index]) {
-            search.readmit(&open, &credible)?;
-            break;
-        }
+    search.anneal(&open)?;
+    let lonely: Vec<usize> = (0..open.len()).filter(|&index| !open[index]).collect();
+    let credible = search.minimize(&open, &lonely, LONELY_RATIO)?;
+    if !credible.is_empty() {
         for index in credible {
             open[index] = true;
         }
+        search.anneal(&open)?;
     }
+    search.readmit(&open)?;
     Ok((search.best, search.weights))
 }
 
@@ -87,47 +87,53 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// Finds the minimum for the weights; gives the links without a weight that do not contradict
-    /// it, where they contradict it by no more than they and it are uncertain.
-    fn credible(&mut self, open: &[bool]) -> Result<Vec<usize>, GraphError> {
+    /// Finds the minimum for the weights. Gives those of the links `asked`, which have no weight, that
+    /// do not contradict it: as seen from the minimum, with its and their own uncertainty, they are
+    /// off by no more than `max_ratio` medians.
+    fn minimize(
+        &mut self,
+        open: &[bool],
+        asked: &[usize],
+        max_ratio: f64,
+    ) -> Result<Vec<usize>, GraphError> {
         let graph = self.graph;
         let structure = structure(graph, self.numbers, &self.weights);
         let mut minimizer = Minimizer::new(graph, self.numbers, &structure)?;
         let poses = self.best.poses.clone();
         let found = minimizer.minimize(poses, &self.weights, self.stop)?;
         self.moved_to(found);
+        if asked.is_empty() {
+            return Ok(Vec::new());
+        }
         let poses = &self.best.poses;
-        let limit = Residuals::at(graph, open, poses).limit(self.robust);
-        let weights = self.weights.iter().enumerate();
-        let waiting: Vec<usize> = weights.filter(|(_, w)| **w == 0.0).map(|(i, _)| i).collect();
-        let uncertainties = minimizer.uncertainties(poses, &self.weights, &waiting)?;
-        let agrees = |&(&index, uncertainty): &(&usize, Matrix6<f64>)| {
-            let link = &graph.links[index];
+        let limit = max_ratio * Residuals::at(graph, open, poses).median;
+        let uncertainties = minimizer.uncertainties(poses, &self.weights, asked)?;
+        let agrees = |(index, uncertainty): &(&usize, Matrix6<f64>)| {
+            let link = &graph.links[**index];
             let covariance = Motion::of(link).covariance + uncertainty;
             squared(LinkAt::new(link, poses).residual(), covariance) <= limit
         };
-        let agreeing = waiting.iter().zip(uncertainties).filter(agrees);
+        let agreeing = asked.iter().zip(uncertainties).filter(agrees);
         Ok(agreeing.map(|(&index, _)| index).collect())
     }
 
-    /// Believes links that have been rejected after all, but for those that the others then pull away
-    /// from.
-    fn readmit(&mut self, open: &[bool], credible: &[usize]) -> Result<(), GraphError> {
-        let mut pulled = credible.to_vec();
+    /// Believes links after all that the kernel has pushed away, but for those that then are not where
+    /// they should be.
+    fn readmit(&mut self, open: &[bool]) -> Result<(), GraphError> {
+        let rejected = |index: &usize| open[*index] && self.weights[*index] == 0.0;
+        let rejected: Vec<usize> = (0..open.len()).filter(rejected).collect();
+        let mut changed = self.minimize(open, &rejected, self.robust.max_ratio)?;
         for weight in [1.0, 0.0] {
-            if pulled.is_empty() {
+            if changed.is_empty() {
                 break;
             }
-            for &index in &pulled {
+            for &index in &changed {
                 self.weights[index] = weight;
             }
-            let structure = structure(self.graph, self.numbers, &self.weights);
-            let mut minimizer = Minimizer::new(self.graph, self.numbers, &structure)?;
-            let poses = self.best.poses.clone();
-            self.moved_to(minimizer.minimize(poses, &self.weights, self.stop)?);
+            self.minimize(open, &[], 0.0)?;
             let residuals = Residuals::at(self.graph, open, &self.best.poses);
-            let limit = residuals.limit(self.robust);
-            pulled.retain(|&index| residuals.chi2[index] > limit);
+            let limit = self.robust.max_ratio * residuals.median;
+            changed.retain(|&index| residuals.chi2[index] > limit);
         }
         Ok(())
     }

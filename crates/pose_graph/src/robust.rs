@@ -114,14 +114,9 @@ impl Residuals {
         }
     }
 
-    /// Above it a link is false.
-    pub fn limit(&self, robust: &Robust) -> f64 {
-        robust.max_ratio * self.median
-    }
-
     /// Weight 1 for links that are open and not false.
-    pub fn cut(&self, graph: &PoseGraph, open: &[bool], robust: &Robust) -> Vec<f64> {
-        let limit = self.limit(robust);
+    fn cut(&self, graph: &PoseGraph, open: &[bool], robust: &Robust) -> Vec<f64> {
+        let limit = robust.max_ratio * self.median;
         self.weights(graph, open, |chi2| f64::from(u8::from(chi2 <= limit)))
     }
 

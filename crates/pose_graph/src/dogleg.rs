@@ -117,7 +117,9 @@ impl<'a> Minimizer<'a> {
             let jacobians = LinkAt::new(link, poses).jacobians(link, poses);
             let from = link.from.and_then(|from| self.numbers[from]);
             let ends = [from, self.numbers[link.to]].into_iter().zip(jacobians);
-            let blocks: Vec<_> = ends.filter_map(|(end, J)| Some((end?, J.transpose()))).collect();
+            let blocks: Vec<_> = ends
+                .filter_map(|(end, J)| Some((end?, J.transpose())))
+                .collect();
             inverse.quadratic(&blocks)
         };
         Ok(links.iter().map(uncertainty).collect())

@@ -16,9 +16,9 @@ mod robust;
 mod solve;
 mod supernodes;
 mod terms;
-mod voting;
 #[cfg(test)]
 mod testing;
+mod voting;
 
 pub use error::GraphError;
 pub use graph::{GravityTerm, Link, PoseGraph};

@@ -18,9 +18,15 @@ use crate::solve::cheaper;
 use crate::terms::LinkAt;
 use crate::voting::supported;
 
-/// Medians of `rᵀΩr` by which a link that nobody vouches for may be off. Most such links are false;
-/// of true ones with Gaussian errors two in ten thousand are off by more.
-const LONELY_RATIO: f64 = 5.0;
+/// 95th percentiles of `rᵀΩr` by which a link that nobody vouches for may be off. Most such links are
+/// false; of true ones with Gaussian errors one in a hundred is off by more.
+const LONELY_RATIO: f64 = 1.3;
+
+/// Nodes for which waiting links are opened one node after the other; beyond, all are.
+const MAX_OPENED_NODES: usize = 100;
+
+/// Times that links are rejected after the kernel's work at most.
+const MAX_TRIMS: usize = 4;
 
 /// Finds the poses that agree best with the true links; gives them and weights of 0 or 1.
 ///
@@ -46,16 +52,20 @@ pub fn believed(
             converged: false,
         },
     };
-    search.anneal(&open)?;
+    search.anneal_opening(&mut open)?;
+    search.minimize()?;
     let lonely: Vec<usize> = (0..open.len()).filter(|&index| !open[index]).collect();
-    let credible = search.minimize(&open, &lonely, LONELY_RATIO)?;
+    let limit = LONELY_RATIO * search.residuals().tail;
+    let credible = search.credible(&lonely, limit)?;
     if !credible.is_empty() {
         for index in credible {
             open[index] = true;
         }
         search.anneal(&open)?;
+        search.minimize()?;
     }
     search.readmit(&open)?;
+    search.trim()?;
     Ok((search.best, search.weights))
 }
 
@@ -87,26 +97,43 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// Finds the minimum for the weights. Gives those of the links `asked`, which have no weight, that
-    /// do not contradict it: as seen from the minimum, with its and their own uncertainty, they are
-    /// off by no more than `max_ratio` medians.
-    fn minimize(
-        &mut self,
-        open: &[bool],
-        asked: &[usize],
-        max_ratio: f64,
-    ) -> Result<Vec<usize>, GraphError> {
-        let graph = self.graph;
-        let structure = structure(graph, self.numbers, &self.weights);
-        let mut minimizer = Minimizer::new(graph, self.numbers, &structure)?;
-        let poses = self.best.poses.clone();
-        let found = minimizer.minimize(poses, &self.weights, self.stop)?;
-        self.moved_to(found);
+    /// The same; where the open links do not determine a node, those at the node are opened as well.
+    fn anneal_opening(&mut self, open: &mut [bool]) -> Result<(), GraphError> {
+        for _ in 0..MAX_OPENED_NODES {
+            let unknown = match self.anneal(open) {
+                Err(GraphError::Singular { node }) => node,
+                done => return done,
+            };
+            let node = self.numbers.iter().position(|&n| n == Some(unknown));
+            for (link, open) in self.graph.links.iter().zip(open.iter_mut()) {
+                *open |= Some(link.to) == node || link.from == node;
+            }
+        }
+        open.fill(true);
+        self.anneal(open)
+    }
+
+    /// Finds the minimum for the weights.
+    fn minimize(&mut self) -> Result<(), GraphError> {
+        let structure = structure(self.graph, self.numbers, &self.weights);
+        let mut relaxation = Relaxation::new(self.graph, self.numbers, &structure)?;
+        // The kernel leaves poses that are bent towards links that have no weight any more.
+        let relaxed = relaxation.poses(&self.weights)?;
+        let start = cheaper(self.graph, &self.best.poses, relaxed, &self.weights)?;
+        let mut minimizer = Minimizer::new(self.graph, self.numbers, &structure)?;
+        self.moved_to(minimizer.minimize(start, &self.weights, self.stop)?);
+        Ok(())
+    }
+
+    /// Those of the links `asked`, which have no weight, that do not contradict the poses: with the
+    /// uncertainty of both, `rᵀΣ⁻¹r` is at most `limit`.
+    fn credible(&self, asked: &[usize], limit: f64) -> Result<Vec<usize>, GraphError> {
         if asked.is_empty() {
             return Ok(Vec::new());
         }
-        let poses = &self.best.poses;
-        let limit = max_ratio * Residuals::at(graph, open, poses).median;
+        let (graph, poses) = (self.graph, &self.best.poses);
+        let structure = structure(graph, self.numbers, &self.weights);
+        let mut minimizer = Minimizer::new(graph, self.numbers, &structure)?;
         let uncertainties = minimizer.uncertainties(poses, &self.weights, asked)?;
         let agrees = |(index, uncertainty): &(&usize, Matrix6<f64>)| {
             let link = &graph.links[**index];
@@ -117,25 +144,45 @@ impl Search<'_> {
         Ok(agreeing.map(|(&index, _)| index).collect())
     }
 
-    /// Believes links after all that the kernel has pushed away, but for those that then are not where
-    /// they should be.
+    /// Believes links after all that the kernel has pushed away.
     fn readmit(&mut self, open: &[bool]) -> Result<(), GraphError> {
         let rejected = |index: &usize| open[*index] && self.weights[*index] == 0.0;
         let rejected: Vec<usize> = (0..open.len()).filter(rejected).collect();
-        let mut changed = self.minimize(open, &rejected, self.robust.max_ratio)?;
-        for weight in [1.0, 0.0] {
-            if changed.is_empty() {
+        let credible = self.credible(&rejected, self.residuals().limit(self.robust))?;
+        if credible.is_empty() {
+            return Ok(());
+        }
+        for index in credible {
+            self.weights[index] = 1.0;
+        }
+        self.minimize()
+    }
+
+    /// Rejects links that even the poses that they have pulled contradict.
+    fn trim(&mut self) -> Result<(), GraphError> {
+        for _ in 0..MAX_TRIMS {
+            let residuals = self.residuals();
+            let limit = residuals.limit(self.robust);
+            let mut n_cut = 0;
+            let links = self.graph.links.iter().zip(&residuals.chi2);
+            for (weight, (link, chi2)) in self.weights.iter_mut().zip(links) {
+                if *weight > 0.0 && !link.trusted && *chi2 > limit {
+                    *weight = 0.0;
+                    n_cut += 1;
+                }
+            }
+            if n_cut == 0 {
                 break;
             }
-            for &index in &changed {
-                self.weights[index] = weight;
-            }
-            self.minimize(open, &[], 0.0)?;
-            let residuals = Residuals::at(self.graph, open, &self.best.poses);
-            let limit = self.robust.max_ratio * residuals.median;
-            changed.retain(|&index| residuals.chi2[index] > limit);
+            self.minimize()?;
         }
         Ok(())
+    }
+
+    /// Of the links that are believed.
+    fn residuals(&self) -> Residuals {
+        let believed: Vec<bool> = self.weights.iter().map(|w| *w > 0.0).collect();
+        Residuals::at(self.graph, &believed, &self.best.poses)
     }
 
     fn moved_to(&mut self, found: Minimum) {
@@ -151,7 +198,9 @@ impl Search<'_> {
 fn first_opened(graph: &PoseGraph, robust: &Robust) -> Vec<bool> {
     let mut open = supported(graph, robust.max_ratio);
     let links = graph.links.iter().zip(&open);
-    let doubtful = links.filter(|(l, _)| !l.trusted).map(|(_, o)| usize::from(*o));
+    let doubtful = links
+        .filter(|(l, _)| !l.trusted)
+        .map(|(_, o)| usize::from(*o));
     let (n_doubtful, n_open) = doubtful.fold((0, 0), |(n, m), o| (n + 1, m + o));
     if 2 * n_open < n_doubtful {
         open.fill(true);

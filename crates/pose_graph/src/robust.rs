@@ -31,6 +31,10 @@ const MAX_FINAL_STEPS: usize = 10;
 /// `rᵀΩr` of links that agree to a millionth of a standard deviation; less is rounding.
 pub const EXACT: f64 = 1e-12;
 
+/// The largest of ten million Gaussian residuals is this many times their 95th percentile; those of
+/// real links have longer tails, which [`Robust::max_ratio`] cuts.
+const MAX_TAIL_RATIO: f64 = 3.5;
+
 /// Change of the cost, as a share, at which the kernel at its final width has done its work.
 const SETTLED: f64 = 1e-2;
 
@@ -94,6 +98,8 @@ pub struct Residuals {
     pub chi2: Vec<f64>,
     /// Of those that may be false.
     pub median: f64,
+    /// 95 of 100 of those are no larger.
+    pub tail: f64,
     worst: f64,
 }
 
@@ -107,11 +113,17 @@ impl Residuals {
         sorted.sort_unstable_by(f64::total_cmp);
         Self {
             chi2,
-            median: sorted
-                .get(sorted.len() / 2)
-                .map_or(EXACT, |m| m.max(EXACT)),
+            median: sorted.get(sorted.len() / 2).map_or(EXACT, |m| m.max(EXACT)),
+            tail: sorted
+                .get(sorted.len() * 95 / 100)
+                .map_or(EXACT, |t| t.max(EXACT)),
             worst: sorted.last().copied().unwrap_or(0.0),
         }
+    }
+
+    /// Above it a link is false, where these are residuals of links that are believed.
+    pub fn limit(&self, robust: &Robust) -> f64 {
+        (robust.max_ratio * self.median).min(MAX_TAIL_RATIO * self.tail)
     }
 
     /// Weight 1 for links that are open and not false.

@@ -71,7 +71,9 @@ impl<const B: usize> Reach<B> {
         let mut sums = vec![SVector::<f64, B>::zeros(); below.len()];
         for (c, column) in values.chunks_exact(height).take(n).enumerate() {
             let y = std::mem::replace(&mut self.rows[begin + c], SVector::zeros()) / column[c];
-            let rest = self.rows[begin + c + 1..begin + n].iter_mut().chain(&mut sums);
+            let rest = self.rows[begin + c + 1..begin + n]
+                .iter_mut()
+                .chain(&mut sums);
             for (row, value) in rest.zip(&column[c + 1..]) {
                 *row -= y * *value;
             }

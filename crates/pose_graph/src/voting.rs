@@ -15,7 +15,7 @@ use crate::motion::Motion;
 use crate::robust::EXACT;
 
 /// Trusted links between the ends of companions at most, at each end.
-const REACH: usize = 4;
+const REACH: usize = 2;
 
 /// Nodes that count as near a node at most, the nearest first.
 const MAX_NEAR: usize = 64;
@@ -99,7 +99,10 @@ impl Neighborhood {
                 Some(own.chi2(&there.then(&crossing).then(home)))
             })
         });
-        along.into_iter().chain(others.take(MAX_COMPANIONS)).collect()
+        along
+            .into_iter()
+            .chain(others.take(MAX_COMPANIONS))
+            .collect()
     }
 
     /// The way over trusted links between nodes that are near each other.

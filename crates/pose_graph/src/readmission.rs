@@ -22,6 +22,9 @@ use crate::voting::supported;
 /// false; of true ones with Gaussian errors one in a hundred is off by more.
 const LONELY_RATIO: f64 = 1.3;
 
+/// Credible links at least that show how they are spread.
+const MIN_CROWD: usize = 8;
+
 /// Nodes for which waiting links are opened one node after the other; beyond, all are.
 const MAX_OPENED_NODES: usize = 100;
 
@@ -55,8 +58,7 @@ pub fn believed(
     search.anneal_opening(&mut open)?;
     search.minimize()?;
     let lonely: Vec<usize> = (0..open.len()).filter(|&index| !open[index]).collect();
-    let limit = LONELY_RATIO * search.residuals().tail;
-    let credible = search.credible(&lonely, limit)?;
+    let credible = search.lonely_credible(&lonely)?;
     if !credible.is_empty() {
         for index in credible {
             open[index] = true;
@@ -125,30 +127,46 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// Those of the links `asked`, which have no weight, that do not contradict the poses: with the
-    /// uncertainty of both, `rᵀΣ⁻¹r` is at most `limit`.
-    fn credible(&self, asked: &[usize], limit: f64) -> Result<Vec<usize>, GraphError> {
-        if asked.is_empty() {
-            return Ok(Vec::new());
+    /// Those of the links that nobody vouches for that do not contradict the poses.
+    ///
+    /// By chance a false one is as near to the poses as the share of the six-dimensional space says:
+    /// eight times fewer are within half the limit, and of true ones most are. So the limit is halved
+    /// until not most of the credible are far out.
+    fn lonely_credible(&self, lonely: &[usize]) -> Result<Vec<usize>, GraphError> {
+        let contradictions = self.contradictions(lonely)?;
+        let mut limit = LONELY_RATIO * self.residuals().tail;
+        let within = |limit: f64| contradictions.iter().filter(|c| **c <= limit).count();
+        while within(limit) >= MIN_CROWD && 2 * within(0.5 * limit) < within(limit) {
+            limit *= 0.5;
         }
+        Ok(those_within(limit, lonely, &contradictions))
+    }
+
+    /// By how much links that have no weight contradict the poses, `rᵀΣ⁻¹r` with the uncertainty of
+    /// both.
+    fn contradictions(&self, asked: &[usize]) -> Result<Vec<f64>, GraphError> {
         let (graph, poses) = (self.graph, &self.best.poses);
         let structure = structure(graph, self.numbers, &self.weights);
         let mut minimizer = Minimizer::new(graph, self.numbers, &structure)?;
         let uncertainties = minimizer.uncertainties(poses, &self.weights, asked)?;
-        let agrees = |(index, uncertainty): &(&usize, Matrix6<f64>)| {
-            let link = &graph.links[**index];
+        let contradiction = |(&index, uncertainty): (&usize, &Matrix6<f64>)| {
+            let link = &graph.links[index];
             let covariance = Motion::of(link).covariance + uncertainty;
-            squared(LinkAt::new(link, poses).residual(), covariance) <= limit
+            squared(LinkAt::new(link, poses).residual(), covariance)
         };
-        let agreeing = asked.iter().zip(uncertainties).filter(agrees);
-        Ok(agreeing.map(|(&index, _)| index).collect())
+        Ok(asked
+            .iter()
+            .zip(&uncertainties)
+            .map(contradiction)
+            .collect())
     }
 
     /// Believes links after all that the kernel has pushed away.
     fn readmit(&mut self, open: &[bool]) -> Result<(), GraphError> {
         let rejected = |index: &usize| open[*index] && self.weights[*index] == 0.0;
         let rejected: Vec<usize> = (0..open.len()).filter(rejected).collect();
-        let credible = self.credible(&rejected, self.residuals().limit(self.robust))?;
+        let limit = self.residuals().limit(self.robust);
+        let credible = those_within(limit, &rejected, &self.contradictions(&rejected)?);
         if credible.is_empty() {
             return Ok(());
         }
@@ -191,6 +209,14 @@ impl Search<'_> {
             ..found
         };
     }
+}
+
+fn those_within(limit: f64, links: &[usize], contradictions: &[f64]) -> Vec<usize> {
+    let links = links.iter().zip(contradictions);
+    links
+        .filter(|(_, c)| **c <= limit)
+        .map(|(&index, _)| index)
+        .collect()
 }
 
 /// The links that others vouch for, and those without which nodes would not be held. All, where less

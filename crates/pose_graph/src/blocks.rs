@@ -152,6 +152,7 @@ mod tests {
     use crate::cholesky::{Cholesky, Inverse};
     use faer::Mat;
     use proptest::prelude::*;
+    use proptest::test_runner::TestCaseError;
 
     proptest! {
         /// Random blocks on a random pattern, against the same matrix held dense.

@@ -89,6 +89,11 @@ impl<const B: usize> Cholesky<B> {
         }
     }
 
+    #[cfg(test)]
+    pub fn is_supernodal(&self) -> bool {
+        matches!(self.symbolic.raw(), SymbolicCholeskyRaw::Supernodal(_))
+    }
+
     /// Solves for up to B right sides in place, with the last factorization.
     pub fn solve(&mut self, right: MatMut<f64>) {
         let scratch = MemStack::new(&mut self.scratch);

@@ -128,31 +128,30 @@ impl Search<'_> {
     }
 
     /// Those of the links that nobody vouches for that do not contradict the poses.
-    ///
-    /// By chance a false one is as near to the poses as the share of the six-dimensional space says:
-    /// eight times fewer are within half the limit, and of true ones most are. So the limit is halved
-    /// until not most of the credible are far out.
     fn lonely_credible(&self, lonely: &[usize]) -> Result<Vec<usize>, GraphError> {
         let contradictions = self.contradictions(lonely)?;
-        let mut limit = LONELY_RATIO * self.residuals().tail;
-        let within = |limit: f64| contradictions.iter().filter(|c| **c <= limit).count();
-        while within(limit) >= MIN_CROWD && 2 * within(0.5 * limit) < within(limit) {
-            limit *= 0.5;
-        }
+        let limit = without_crowd(&contradictions, LONELY_RATIO * self.residuals().tail);
         Ok(those_within(limit, lonely, &contradictions))
     }
 
     /// By how much links that have no weight contradict the poses, `rᵀΣ⁻¹r` with the uncertainty of
-    /// both.
+    /// both, to be compared with residuals of links that have made the poses. These are smaller by the
+    /// share of links beyond those that it takes to determine the poses.
     fn contradictions(&self, asked: &[usize]) -> Result<Vec<f64>, GraphError> {
+        if asked.is_empty() {
+            return Ok(Vec::new());
+        }
         let (graph, poses) = (self.graph, &self.best.poses);
         let structure = structure(graph, self.numbers, &self.weights);
         let mut minimizer = Minimizer::new(graph, self.numbers, &structure)?;
         let uncertainties = minimizer.uncertainties(poses, &self.weights, asked)?;
+        let n_believed = self.weights.iter().filter(|w| **w > 0.0).count();
+        let n_free = self.numbers.iter().flatten().count();
+        let redundancy = 1.0 - (n_free as f64 / n_believed.max(1) as f64).min(1.0);
         let contradiction = |(&index, uncertainty): (&usize, &Matrix6<f64>)| {
             let link = &graph.links[index];
             let covariance = Motion::of(link).covariance + uncertainty;
-            squared(LinkAt::new(link, poses).residual(), covariance)
+            redundancy * squared(LinkAt::new(link, poses).residual(), covariance)
         };
         Ok(asked
             .iter()
@@ -211,6 +210,18 @@ impl Search<'_> {
     }
 }
 
+/// The limit, halved until not most of those within it are far out.
+///
+/// False links are near the poses by chance, as many as the share of the six-dimensional space says:
+/// eight times fewer are within half a limit of squares. Of true ones most are.
+fn without_crowd(contradictions: &[f64], mut limit: f64) -> f64 {
+    let within = |limit: f64| contradictions.iter().filter(|c| **c <= limit).count();
+    while within(limit) >= MIN_CROWD && 2 * within(0.5 * limit) < within(limit) {
+        limit *= 0.5;
+    }
+    limit
+}
+
 fn those_within(limit: f64, links: &[usize], contradictions: &[f64]) -> Vec<usize> {
     let links = links.iter().zip(contradictions);
     links
@@ -246,5 +257,98 @@ fn open_bridges(graph: &PoseGraph, open: &mut [bool]) {
             let from = link.from.is_none_or(|from| held[from]);
             *open |= from != held[link.to] || link.from.is_none();
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::poses::numbered;
+    use crate::testing::{drifted, farthest, helix, noisy_helix, true_link, with_false_links};
+    use nalgebra::Vector3;
+
+    const ROBUST: Robust = Robust {
+        kernel_width: 3.0,
+        max_ratio: 25.0,
+        growth: 2.0,
+    };
+
+    fn found(graph: &PoseGraph) -> Result<(Minimum, Vec<f64>), GraphError> {
+        let stop = Stop {
+            max_iterations: 50,
+            min_relative_decrease: 1e-9,
+        };
+        believed(graph, &numbered(graph), stop, &ROBUST)
+    }
+
+    /// The last turn has only its way in time and, among many false links, one true one that nobody
+    /// vouches for; the way in time has drifted by metres where it ends.
+    #[test]
+    fn a_lonely_true_link_among_false_ones_is_found() -> Result<(), GraphError> {
+        let truth = helix(8, 20);
+        let mut graph = noisy_helix(8, 20);
+        graph.links.retain(|l| l.trusted || l.to < 140);
+        graph.poses = drifted(&graph, &Vector3::new(0.002, 0.001, 0.02));
+        let mut graph = with_false_links(graph, 24);
+        graph.links.push(true_link(&truth, 98, 158));
+        let lonely = graph.links.len() - 1;
+        let n_true = lonely - 24;
+        let (minimum, weights) = found(&graph)?;
+        assert!(weights[..n_true].iter().all(|&w| w == 1.0));
+        assert!(weights[n_true..lonely].iter().all(|&w| w == 0.0));
+        assert_eq!(weights[lonely], 1.0);
+        assert!(farthest(&minimum.poses, &truth.poses) < 0.2);
+        Ok(())
+    }
+
+    /// Nobody vouches for the link without which the last turns would not be held.
+    #[test]
+    fn what_only_a_lonely_link_holds_is_held() -> Result<(), GraphError> {
+        let truth = helix(8, 20);
+        let mut graph = noisy_helix(8, 20);
+        graph
+            .links
+            .retain(|l| l.from.is_some_and(|from| (from < 100) == (l.to < 100)));
+        graph.links.push(true_link(&truth, 80, 120));
+        let (minimum, weights) = found(&graph)?;
+        assert!(weights.iter().all(|&w| w == 1.0));
+        assert!(farthest(&minimum.poses, &truth.poses) < 0.2);
+        Ok(())
+    }
+
+    /// What the others vouch for leaves a node undetermined about one axis; a lonely link does not.
+    #[test]
+    fn lonely_links_are_opened_where_others_do_not_determine_a_node() -> Result<(), GraphError> {
+        let truth = helix(8, 20);
+        let mut graph = noisy_helix(8, 20);
+        graph.links.retain(|l| l.trusted || l.to < 140);
+        for link in graph.links.iter_mut().filter(|l| l.to == 159) {
+            link.information.fill_row(2, 0.0);
+            link.information.fill_column(2, 0.0);
+        }
+        graph.links.push(true_link(&truth, 98, 159));
+        let (minimum, weights) = found(&graph)?;
+        assert!(weights.iter().all(|&w| w == 1.0));
+        assert!(
+            minimum.poses[159]
+                .rotation
+                .angle_to(&truth.poses[159].rotation)
+                < 0.02
+        );
+        Ok(())
+    }
+
+    #[test]
+    fn a_limit_holds_for_true_links_and_gives_way_to_false_ones() {
+        // Squared distances of points spread evenly in a ball of six dimensions.
+        let by_chance: Vec<f64> = (1..=200)
+            .map(|k| 16.0 * (f64::from(k) / 200.0).cbrt())
+            .collect();
+        let limit = without_crowd(&by_chance, 16.0);
+        assert!(by_chance.iter().filter(|c| **c <= limit).count() < MIN_CROWD);
+        // Quantiles of the squared length of a Gaussian vector of six dimensions.
+        let of_true = [1.6, 2.2, 3.1, 3.8, 4.6, 5.3, 6.2, 7.2, 8.6, 10.6, 12.6];
+        assert_eq!(without_crowd(&of_true, 16.0), 16.0);
+        assert_eq!(without_crowd(&by_chance[190..196], 16.0), 16.0);
     }
 }

@@ -111,7 +111,7 @@ fn named(error: GraphError, numbers: &[Option<usize>]) -> GraphError {
 mod tests {
     use super::*;
     use crate::graph::{GravityTerm, Link};
-    use crate::testing::{drifted, farthest, helix};
+    use crate::testing::{drifted, farthest, helix, noisy_helix, with_false_links};
     use bentwing_trajectory::so3;
     use nalgebra::{Matrix6, Vector3, Vector6};
 
@@ -132,35 +132,9 @@ mod tests {
     /// The true graph, and the same with noisy measurements and poses that have drifted.
     fn noisy() -> (PoseGraph, PoseGraph) {
         let truth = helix(8, 20);
-        let mut graph = truth.clone();
-        for (k, link) in graph.links.iter_mut().enumerate() {
-            let wave = |i: usize| 0.005 * ((3 * k + i) as f64 * 1.7).sin();
-            let turn = so3::exp(&Vector3::new(wave(0), wave(1), wave(2)));
-            let shift = Vector3::new(wave(3), wave(4), wave(5)) * 4.0;
-            link.T_from_to *= Isometry3::from_parts(shift.into(), turn);
-        }
+        let mut graph = noisy_helix(8, 20);
         graph.poses = drifted(&graph, &Vector3::new(0.002, 0.001, 0.02));
         (truth, graph)
-    }
-
-    fn with_false_links(mut graph: PoseGraph, n: usize) -> PoseGraph {
-        let n_nodes = graph.poses.len();
-        let seen = graph.links[n_nodes].clone();
-        for k in 0..n {
-            let from = (37 * k) % n_nodes;
-            let to = (from + 30 + 11 * k) % n_nodes;
-            let ends = if from == to {
-                (0, n_nodes - 1)
-            } else {
-                (from, to)
-            };
-            graph.links.push(Link {
-                from: Some(ends.0),
-                to: ends.1,
-                ..seen.clone()
-            });
-        }
-        graph
     }
 
     #[test]

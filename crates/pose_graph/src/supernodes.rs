@@ -85,3 +85,48 @@ impl<const B: usize> Reach<B> {
         squared
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::GraphError;
+    use crate::blocks::{BlockMatrix, Structure};
+    use crate::cholesky::{Cholesky, Inverse};
+    use faer::Mat;
+    use nalgebra::SMatrix;
+
+    /// A band so wide that supernodes pay, against whole solutions.
+    #[test]
+    fn products_with_the_inverse_are_those_of_whole_solutions() -> Result<(), GraphError> {
+        let n = 90;
+        let pairs: Vec<_> = (0..n)
+            .flat_map(|a| (a + 1..n.min(a + 17)).map(move |b| (a, b)))
+            .collect();
+        let structure = Structure::new(n, pairs.iter().copied());
+        let mut matrix = BlockMatrix::<6>::new(&structure);
+        let entry = |r: usize, c: usize, k: usize| ((7 * r + 3 * c + k) as f64).sin();
+        for k in 0..n {
+            matrix.add(k, k, &(SMatrix::identity() * 300.0));
+        }
+        for (k, &(a, b)) in pairs.iter().enumerate() {
+            matrix.add(a, b, &SMatrix::from_fn(|r, c| entry(r, c, k)));
+        }
+        let mut cholesky = Cholesky::<6>::new(&structure)?;
+        cholesky.factorize(&matrix)?;
+        assert!(cholesky.is_supernodal());
+        let X = SMatrix::<f64, 6, 6>::from_fn(|r, c| entry(r, c, 1));
+        let Y = SMatrix::<f64, 6, 6>::from_fn(|r, c| entry(c, r, 5));
+        for (a, b) in [(0, 89), (5, 77), (77, 5), (89, 88)] {
+            let found = Inverse::new(&mut cholesky).quadratic(&[(a, X), (b, Y)]);
+            let mut columns = Mat::zeros(6 * n, 6);
+            for (r, c) in (0..6).flat_map(|r| (0..6).map(move |c| (r, c))) {
+                columns[(6 * a + r, c)] = X[(r, c)];
+                columns[(6 * b + r, c)] = Y[(r, c)];
+            }
+            cholesky.solve(columns.as_mut());
+            let block = |k: usize| SMatrix::<f64, 6, 6>::from_fn(|r, c| columns[(6 * k + r, c)]);
+            let expected = X.tr_mul(&block(a)) + Y.tr_mul(&block(b));
+            assert!((found - expected).amax() < 1e-13);
+        }
+        Ok(())
+    }
+}

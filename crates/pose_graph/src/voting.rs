@@ -134,3 +134,53 @@ fn reached(node: usize, trusted: &[Vec<(usize, Motion)>]) -> Vec<(usize, Motion)
     }
     found
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{helix, noisy_helix, true_link, with_false_links};
+
+    #[test]
+    fn companions_vouch_for_every_true_link_and_for_no_false_one() {
+        let graph = noisy_helix(8, 20);
+        let n_true = graph.links.len();
+        let supported = supported(&with_false_links(graph, 30), 25.0);
+        assert!(supported[..n_true].iter().all(|&s| s));
+        assert!(supported[n_true..].iter().all(|&s| !s));
+    }
+
+    #[test]
+    fn links_that_are_seen_from_their_other_end_are_companions_as_well() {
+        let mut graph = noisy_helix(8, 20);
+        for link in graph.links.iter_mut().filter(|l| !l.trusted).step_by(2) {
+            link.from = Some(std::mem::replace(&mut link.to, link.from.unwrap_or(0)));
+            link.T_from_to = link.T_from_to.inverse();
+        }
+        assert!(supported(&graph, 25.0).iter().all(|&s| s));
+    }
+
+    #[test]
+    fn nobody_vouches_for_a_true_link_that_is_alone() {
+        let mut graph = noisy_helix(8, 20);
+        graph.links.push(true_link(&helix(8, 20), 3, 150));
+        let supported = supported(&graph, 25.0);
+        assert_eq!(
+            supported.iter().position(|&s| !s),
+            Some(graph.links.len() - 1)
+        );
+    }
+
+    #[test]
+    fn the_way_along_trusted_links_speaks_for_a_link_between_near_nodes_and_against_a_false_one() {
+        let truth = helix(8, 20);
+        let mut graph = noisy_helix(8, 20);
+        graph.links.push(true_link(&truth, 3, 5));
+        graph.links.push(Link {
+            to: 61,
+            from: Some(60),
+            ..true_link(&truth, 3, 5)
+        });
+        let n = graph.links.len();
+        assert_eq!(supported(&graph, 25.0)[n - 2..], [true, false]);
+    }
+}

@@ -57,9 +57,17 @@ def with_known_truth(graph: PoseGraph, seed: int) -> PoseGraph:
         positions=shifts + geometry.rotate(turns, signs * off_shifts),
         quats_xyzw=geometry.multiply(turns, geometry.exp(signs * off_turns)),
     )
-    return replace(
-        graph, positions=best.positions, quats_xyzw=best.quats_xyzw, links=measured
-    )
+    return replace(graph, positions=best.positions, quats_xyzw=best.quats_xyzw, links=measured)
+
+
+def noisy_sphere_positions() -> np.ndarray:
+    """Of sphere_bignoise: laps of 50 nodes about a sphere of 100 m, of 50 laps all but the first three
+    and the last three.
+    """
+    nodes = np.arange(2200)
+    down, around = (nodes + 150) * np.pi / 2500, 2 * np.pi * nodes / 50
+    level = 100 * np.sin(down)
+    return np.stack([level * np.cos(around), level * np.sin(around), 100 * np.cos(down)], axis=1)
 
 
 def position_error(positions: np.ndarray, truth: np.ndarray) -> float:

@@ -66,12 +66,12 @@ impl Motion {
     /// variance of the difference.
     pub fn chi2(&self, other: &Self) -> f64 {
         let error = se3::log(&self.T.inv_mul(&other.T));
-        squared(&error, self.covariance + other.covariance)
+        squared(&error, &(self.covariance + other.covariance))
     }
 }
 
 /// `rᵀΣ⁻¹r`; infinite where Σ is no covariance.
-pub fn squared(r: &Vector6<f64>, covariance: Matrix6<f64>) -> f64 {
+pub fn squared(r: &Vector6<f64>, covariance: &Matrix6<f64>) -> f64 {
     let solved = covariance.cholesky().map(|c| r.dot(&c.solve(r)));
     solved.unwrap_or(f64::INFINITY)
 }

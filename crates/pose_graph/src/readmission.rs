@@ -41,34 +41,29 @@ pub fn believed(
     stop: Stop,
     robust: &Robust,
 ) -> Result<(Minimum, Vec<f64>), GraphError> {
-    let mut open = first_opened(graph, robust);
+    let given = Minimum {
+        poses: graph.poses.clone(),
+        cost: f64::INFINITY,
+        n_iterations: 0,
+        converged: false,
+    };
     let mut search = Search {
         graph,
         numbers,
         stop,
         robust,
         weights: Vec::new(),
-        best: Minimum {
-            poses: graph.poses.clone(),
-            cost: f64::INFINITY,
-            n_iterations: 0,
-            converged: false,
-        },
+        best: given.clone(),
     };
-    search.anneal_opening(&mut open)?;
-    search.minimize()?;
-    let lonely: Vec<usize> = (0..open.len()).filter(|&index| !open[index]).collect();
-    let credible = search.lonely_credible(&lonely)?;
-    if !credible.is_empty() {
-        for index in credible {
-            open[index] = true;
+    let result = match search.in_rounds() {
+        Err(GraphError::Singular { .. }) => {
+            // Links that wait may be what holds a node after others are rejected.
+            search.best = given;
+            search.among(&vec![true; graph.links.len()])
         }
-        search.anneal(&open)?;
-        search.minimize()?;
-    }
-    search.readmit(&open)?;
-    search.trim()?;
-    Ok((search.best, search.weights))
+        done => done,
+    };
+    result.map(|()| (search.best, search.weights))
 }
 
 /// The best poses so far, and weights of the links that made them.
@@ -82,6 +77,35 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
+    /// Finds the true links among those that others vouch for, and with these the others.
+    fn in_rounds(&mut self) -> Result<(), GraphError> {
+        let mut open = first_opened(self.graph, self.robust);
+        self.anneal_opening(&mut open)?;
+        self.minimize()?;
+        let lonely: Vec<usize> = (0..open.len()).filter(|&index| !open[index]).collect();
+        let credible = self.lonely_credible(&lonely)?;
+        if credible.is_empty() {
+            return self.revise(&open);
+        }
+        for index in credible {
+            open[index] = true;
+        }
+        self.among(&open)
+    }
+
+    /// Finds the true links among those that are `open`.
+    fn among(&mut self, open: &[bool]) -> Result<(), GraphError> {
+        self.anneal(open)?;
+        self.minimize()?;
+        self.revise(open)
+    }
+
+    /// Does what the kernel leaves to do.
+    fn revise(&mut self, open: &[bool]) -> Result<(), GraphError> {
+        self.readmit(open)?;
+        self.trim()
+    }
+
     /// Tells which of the `open` links are true, roughly.
     fn anneal(&mut self, open: &[bool]) -> Result<(), GraphError> {
         let (graph, numbers) = (self.graph, self.numbers);
@@ -151,7 +175,7 @@ impl Search<'_> {
         let contradiction = |(&index, uncertainty): (&usize, &Matrix6<f64>)| {
             let link = &graph.links[index];
             let covariance = Motion::of(link).covariance + uncertainty;
-            redundancy * squared(LinkAt::new(link, poses).residual(), covariance)
+            redundancy * squared(LinkAt::new(link, poses).residual(), &covariance)
         };
         Ok(asked
             .iter()
@@ -255,7 +279,7 @@ fn open_bridges(graph: &PoseGraph, open: &mut [bool]) {
         }
         for (link, open) in graph.links.iter().zip(open.iter_mut()) {
             let from = link.from.is_none_or(|from| held[from]);
-            *open |= from != held[link.to] || link.from.is_none();
+            *open |= from != held[link.to];
         }
     }
 }

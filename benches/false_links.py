@@ -7,8 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from bentwing import geometry
 from bentwing.evaluate.alignment import align
-from bentwing.pose_graph import Links, PoseGraph
+from bentwing.pose_graph import Links, PoseGraph, SolveSettings, solve
 
 
 def with_false_links(graph: PoseGraph, share: float, seed: int) -> tuple[PoseGraph, int]:
@@ -31,6 +32,42 @@ def with_false_links(graph: PoseGraph, share: float, seed: int) -> tuple[PoseGra
         np.append(links.trusted, np.zeros(n, np.bool_)),
     )
     return replace(graph, links=false), n
+
+
+def with_known_truth(graph: PoseGraph, seed: int) -> PoseGraph:
+    """A graph like this one whose poses are true: those of the lowest cost, and links that are off by
+    as much as each is off from these, to one side or the other by chance.
+
+    That keeps what real links have: errors of very different size, and information that does not tell
+    it (the wild bootstrap of Wu 1986, with Rademacher's signs).
+    """
+    links = graph.links
+    best = solve(graph, SolveSettings(robust=None))
+    start, end = links.nodes.T
+    back = geometry.inverse(best.quats_xyzw[start])
+    shifts = geometry.rotate(back, best.positions[end] - best.positions[start])
+    turns = geometry.multiply(back, best.quats_xyzw[end])
+    # What is measured, as seen from what is true.
+    inverse = geometry.inverse(turns)
+    off_turns = geometry.log(geometry.multiply(inverse, links.quats_xyzw))
+    off_shifts = geometry.rotate(inverse, links.positions - shifts)
+    signs = np.random.default_rng(seed).choice([-1.0, 1.0], size=(len(links), 1))
+    measured = replace(
+        links,
+        positions=shifts + geometry.rotate(turns, signs * off_shifts),
+        quats_xyzw=geometry.multiply(turns, geometry.exp(signs * off_turns)),
+    )
+    return replace(graph, positions=best.positions, quats_xyzw=best.quats_xyzw, links=measured)
+
+
+def noisy_sphere_positions() -> np.ndarray:
+    """Of sphere_bignoise: laps of 50 nodes about a sphere of 100 m, of 50 laps all but the first three
+    and the last three.
+    """
+    nodes = np.arange(2200)
+    down, around = (nodes + 150) * np.pi / 2500, 2 * np.pi * nodes / 50
+    level = 100 * np.sin(down)
+    return np.stack([level * np.cos(around), level * np.sin(around), 100 * np.cos(down)], axis=1)
 
 
 def position_error(positions: np.ndarray, truth: np.ndarray) -> float:

@@ -10,9 +10,11 @@ ones the faster. Its graph is the one that our reader made, so that both minimiz
 ½ Σ rᵀΩr: in cubicle 5021 information matrices are indefinite and become the nearest that are not. Both use
 one thread; the repetitions are interleaved.
 
-False links join nodes drawn at random by what a true loop link has measured. The error is the root
-mean square distance after alignment to the truth where there is one, else to the positions of the
-lowest cost of the graph without false links.
+False links join nodes drawn at random by what a true loop link has measured, 20 for every 100 loop
+links. `moved` is the root mean square distance from the positions without false links. The errors are
+such distances from the truth, which is known for the two spheres; the other graphs get one: the poses of
+the lowest cost are taken for true, and each link is off by as much as it is from these, to one side
+or the other by chance. Of several seeds the worst counts, in every column.
 """
 
 from __future__ import annotations
@@ -24,13 +26,19 @@ import subprocess
 import sys
 import tempfile
 import time
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from false_links import position_error, with_false_links
+from false_links import (
+    noisy_sphere_positions,
+    position_error,
+    with_false_links,
+    with_known_truth,
+)
 
 from bentwing import geometry
-from bentwing.pose_graph import PoseGraph, SolveSettings, read_g2o, solve
+from bentwing.pose_graph import PoseGraph, Solution, SolveSettings, read_g2o, solve
 
 GRAPHS = (
     "smallGrid3D", "parking-garage", "sphere2500", "torus3D", "cubicle", "sphere_bignoise_vertex3",
@@ -119,20 +127,65 @@ def true_positions(path: Path) -> np.ndarray:
     return np.array(positions)
 
 
-def disturb(name: str, graph: PoseGraph, truth: np.ndarray | None, seed: int) -> None:
-    reference = solve(graph, BELIEVING).positions if truth is None else truth
-    clean = solve(graph)
+def truth_of(name: str, folder: Path) -> np.ndarray | None:
+    if name == "sphere_bignoise_vertex3":
+        return noisy_sphere_positions()
+    path = folder / f"{name}_groundtruth.txt"
+    return true_positions(path) if path.exists() else None
+
+
+@dataclass(frozen=True)
+class Disturbed:
+    """What false links have done to one graph."""
+
+    n_false: int
+    n_missed: int
+    n_true_rejected: int
+    n_rejected_without: int
+    moved: float
+    error_without: float
+    error_with: float
+    seconds: float
+
+    @property
+    def ratio(self) -> float:
+        return self.error_with / self.error_without
+
+
+def disturb(graph: PoseGraph, clean: Solution, truth: np.ndarray | None, seed: int) -> Disturbed:
     false, n = with_false_links(graph, 0.2, seed)
     start = time.perf_counter()
     found = solve(false)
     seconds = time.perf_counter() - start
+    n_found = int(np.count_nonzero(found.rejected >= len(graph.links)))
+    if truth is None:
+        known = with_known_truth(graph, seed)
+        truth = known.positions
+        given = replace(known, positions=graph.positions, quats_xyzw=graph.quats_xyzw)
+        solutions = [solve(given), solve(with_false_links(given, 0.2, seed)[0])]
+    else:
+        solutions = [clean, found]
+    return Disturbed(
+        n,
+        n - n_found,
+        len(found.rejected) - n_found,
+        len(clean.rejected),
+        position_error(found.positions, clean.positions),
+        *(position_error(solution.positions, truth) for solution in solutions),
+        seconds,
+    )
+
+
+def disturb_by_turns(name: str, graph: PoseGraph, folder: Path, seeds: list[int]) -> None:
+    truth, clean = truth_of(name, folder), solve(graph)
+    runs = [disturb(graph, clean, truth, seed) for seed in seeds]
+    worst = max(runs, key=lambda run: run.ratio)
     n_loops = int(np.count_nonzero(~graph.links.trusted))
-    n_rejected = np.count_nonzero(found.rejected >= len(graph.links))
-    errors = [position_error(s.positions, reference) for s in (clean, found)]
-    extent = np.ptp(reference, axis=0).max()
     print(
-        f"| {name} | {n_loops} | {n} | {n_rejected} | {len(found.rejected) - n_rejected} "
-        f"| {extent:.0f} m | {errors[0]:.4f} m | {errors[1]:.4f} m | {seconds:.1f} s |",
+        f"| {name} | {n_loops} | {worst.n_false} | {max(r.n_missed for r in runs)} "
+        f"| {worst.n_rejected_without} | {max(r.n_true_rejected for r in runs)} "
+        f"| {max(r.moved for r in runs):.4f} m | {worst.error_without:.4f} m "
+        f"| {worst.error_with:.4f} m | {worst.ratio:.3f} | {max(r.seconds for r in runs):.1f} s |",
         flush=True,
     )
 
@@ -143,7 +196,7 @@ def main() -> None:
     parser.add_argument("--peer", default=sys.executable, help="interpreter with gtsam")
     parser.add_argument("--graphs", nargs="+", default=GRAPHS)
     parser.add_argument("--repeats", type=int, default=5)
-    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--seeds", type=int, nargs="+", default=[0], help="of the false links")
     parser.add_argument("--no-false-links", action="store_true")
     parser.add_argument("--only-false-links", action="store_true")
     options = parser.parse_args()
@@ -155,13 +208,11 @@ def main() -> None:
             compare(name, graph, options.peer, options.repeats)
     if not options.no_false_links:
         print(
-            "\n| graph | loop links | false | false rejected | true rejected | extent "
-            "| error without | error with | time |\n|---|---|---|---|---|---|---|---|---|"
+            "\n| graph | loop links | false | of these believed | true rejected without | with | moved "
+            "| error without | with | ratio | time |\n|---|---|---|---|---|---|---|---|---|---|---|"
         )
         for name, graph in graphs.items():
-            path = options.folder / f"{name}_groundtruth.txt"
-            truth = true_positions(path) if path.exists() else None
-            disturb(name, graph, truth, options.seed)
+            disturb_by_turns(name, graph, options.folder, options.seeds)
 
 
 if __name__ == "__main__":

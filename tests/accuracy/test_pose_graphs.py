@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from false_links import noisy_sphere_positions, position_error, with_false_links
 
 from bentwing.pose_graph import SolveSettings, read_g2o, solve
 
@@ -48,14 +49,29 @@ def test_information_that_is_none_is_counted(read):
 
 @pytest.mark.parametrize(
     ("name", "bound"),
-    [("smallGrid3D", 0.01), pytest.param("sphere2500", 0.01, marks=pytest.mark.slow)],
+    [
+        ("smallGrid3D", 0.001),
+        pytest.param("parking-garage", 0.01, marks=pytest.mark.slow),
+        pytest.param("sphere2500", 0.001, marks=pytest.mark.slow),
+        pytest.param("torus3D", 0.01, marks=pytest.mark.slow),
+        pytest.param("cubicle", 0.03, marks=pytest.mark.slow),
+    ],
 )
-def test_false_links_move_the_positions_by_less_than_a_centimetre(read, name, bound):
-    from false_links import position_error, with_false_links
-
+def test_a_fifth_of_false_links_does_not_move_the_positions(read, name, bound):
     graph = read(name).graph
     clean = solve(graph)
     false, n = with_false_links(graph, 0.2, seed=0)
     solution = solve(false)
-    assert set(np.arange(len(graph.links), len(graph.links) + n)) <= set(solution.rejected.tolist())
+    found = np.count_nonzero(solution.rejected >= len(graph.links))
+    assert found >= 0.995 * n
     assert position_error(solution.positions, clean.positions) < bound
+
+
+@pytest.mark.slow
+def test_on_the_noisiest_graph_false_links_do_not_double_the_error(read):
+    """A link there is off by metres, so that a few false ones pass for true."""
+    graph, truth = read("sphere_bignoise_vertex3").graph, noisy_sphere_positions()
+    clean = position_error(solve(graph).positions, truth)
+    assert clean < 3.1
+    false, _ = with_false_links(graph, 0.2, seed=0)
+    assert position_error(solve(false).positions, truth) < 2.0 * clean

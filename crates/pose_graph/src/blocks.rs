@@ -149,9 +149,10 @@ impl<'a, const B: usize> BlockMatrix<'a, B> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cholesky::Cholesky;
+    use crate::cholesky::{Cholesky, Inverse};
     use faer::Mat;
     use proptest::prelude::*;
+    use proptest::test_runner::TestCaseError;
 
     proptest! {
         /// Random blocks on a random pattern, against the same matrix held dense.
@@ -184,6 +185,21 @@ mod tests {
             cholesky.solve(solution.as_mut());
             let found = nalgebra::DVector::from_fn(21, |i, _| solution[(i, 0)]);
             prop_assert!((&dense * found - x).amax() < 1e-12);
+            let (X, Y) = (SMatrix::from_fn(|r, c| entries[4 * r + c]), SMatrix::from_fn(|r, c| entries[r + 5 * c]));
+            let mut columns = nalgebra::DMatrix::zeros(21, 3);
+            columns.view_mut((6, 0), (3, 3)).copy_from(&X);
+            columns.view_mut((15, 0), (3, 3)).copy_from(&Y);
+            let Some(inverse) = dense.try_inverse() else {
+                return Err(TestCaseError::fail("singular"));
+            };
+            let expected = columns.tr_mul(&(inverse * &columns));
+            let mut found = Inverse::new(&mut cholesky);
+            // A second time, because a first one must leave nothing behind.
+            for _ in 0..2 {
+                let product = found.quadratic(&[(2, X), (5, Y)]);
+                let difference = SMatrix::<f64, 3, 3>::from_fn(|r, c| product[(r, c)] - expected[(r, c)]);
+                prop_assert!(difference.amax() < 1e-12);
+            }
         }
     }
 }

@@ -6,14 +6,16 @@ use faer::linalg::cholesky::llt::factor::LltError;
 use faer::perm::PermRef;
 use faer::sparse::linalg::amd;
 use faer::sparse::linalg::cholesky::{
-    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering,
+    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
     factorize_symbolic_cholesky,
 };
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMat};
-use faer::{Conj, MatMut, Par, Side};
+use faer::{Conj, Mat, MatMut, Par, Side};
+use nalgebra::SMatrix;
 
 use crate::GraphError;
 use crate::blocks::{BlockMatrix, Structure};
+use crate::supernodes::Reach;
 
 /// A factorization of matrices of one structure.
 pub struct Cholesky<const B: usize> {
@@ -87,12 +89,71 @@ impl<const B: usize> Cholesky<B> {
         }
     }
 
+    #[cfg(test)]
+    pub fn is_supernodal(&self) -> bool {
+        matches!(self.symbolic.raw(), SymbolicCholeskyRaw::Supernodal(_))
+    }
+
     /// Solves for up to B right sides in place, with the last factorization.
     pub fn solve(&mut self, right: MatMut<f64>) {
         let scratch = MemStack::new(&mut self.scratch);
         let llt = LltRef::new(&self.symbolic, &self.factor);
         llt.solve_in_place_with_conj(Conj::No, right, Par::Seq, scratch);
     }
+}
+
+/// `Xᵀ A⁻¹ X` for ever other X that are zero but for few blocks, with one factorization of A.
+pub struct Inverse<'a, const B: usize> {
+    cholesky: &'a mut Cholesky<B>,
+    /// Where the unknowns are among the eliminated.
+    places: Vec<usize>,
+    reach: Option<Reach<B>>,
+}
+
+impl<'a, const B: usize> Inverse<'a, B> {
+    /// Of the matrix that was factorized last.
+    pub fn new(cholesky: &'a mut Cholesky<B>) -> Self {
+        let mut places = vec![0; cholesky.order.len()];
+        for (place, &block) in cholesky.order.iter().enumerate() {
+            places[block] = place;
+        }
+        let reach = match cholesky.symbolic.raw() {
+            SymbolicCholeskyRaw::Supernodal(symbolic) => Some(Reach::new(symbolic)),
+            SymbolicCholeskyRaw::Simplicial(_) => None,
+        };
+        Self {
+            cholesky,
+            places,
+            reach,
+        }
+    }
+
+    /// The product; X has these blocks of rows.
+    pub fn quadratic(&mut self, blocks: &[(usize, SMatrix<f64, B, B>)]) -> SMatrix<f64, B, B> {
+        let (raw, factor) = (self.cholesky.symbolic.raw(), &self.cholesky.factor);
+        if let (SymbolicCholeskyRaw::Supernodal(symbolic), Some(reach)) = (raw, &mut self.reach) {
+            for (block, X) in blocks {
+                reach.add(B * self.places[*block], X);
+            }
+            return reach.squared(symbolic, factor);
+        }
+        let mut columns = Mat::zeros(B * self.places.len(), B);
+        for (block, X) in blocks {
+            for (r, c) in entries::<B>() {
+                columns[(B * block + r, c)] += X[(r, c)];
+            }
+        }
+        self.cholesky.solve(columns.as_mut());
+        let solved = |block: usize| SMatrix::from_fn(|r, c| columns[(B * block + r, c)]);
+        blocks
+            .iter()
+            .map(|(block, X)| X.tr_mul(&solved(*block)))
+            .sum()
+    }
+}
+
+fn entries<const B: usize>() -> impl Iterator<Item = (usize, usize)> {
+    (0..B).flat_map(|r| (0..B).map(move |c| (r, c)))
 }
 
 /// An order of elimination with little fill (Amestoy, Davis and Duff 1996).

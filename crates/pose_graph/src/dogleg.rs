@@ -6,14 +6,15 @@
 //! so that radians and metres compare.
 
 use faer::MatMut;
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Matrix6};
 
 use crate::GraphError;
 use crate::blocks::Structure;
-use crate::cholesky::Cholesky;
+use crate::cholesky::{Cholesky, Inverse};
 use crate::equations::{Equations, cost};
 use crate::graph::PoseGraph;
 use crate::poses::corrected;
+use crate::terms::LinkAt;
 
 /// Steps below this, rad and m, change nothing that is known.
 const NEGLIGIBLE_STEP: f64 = 1e-9;
@@ -94,6 +95,34 @@ impl<'a> Minimizer<'a> {
             best.converged |= radius < SMALLEST_REGION * legs.full_length;
         }
         Ok(best)
+    }
+
+    /// Covariances `J Σ Jᵀ` of the residuals of `links` that the poses' covariance Σ leaves, where
+    /// `weights` tells the links that made the poses.
+    ///
+    /// # Errors
+    /// When the links do not determine all poses.
+    pub fn uncertainties(
+        &mut self,
+        poses: &[Isometry3<f64>],
+        weights: &[f64],
+        links: &[usize],
+    ) -> Result<Vec<Matrix6<f64>>, GraphError> {
+        self.equations
+            .linearize(self.graph, self.numbers, poses, weights);
+        self.cholesky.factorize(&self.equations.matrix)?;
+        let mut inverse = Inverse::new(&mut self.cholesky);
+        let uncertainty = |&index: &usize| {
+            let link = &self.graph.links[index];
+            let jacobians = LinkAt::new(link, poses).jacobians(link, poses);
+            let from = link.from.and_then(|from| self.numbers[from]);
+            let ends = [from, self.numbers[link.to]].into_iter().zip(jacobians);
+            let blocks: Vec<_> = ends
+                .filter_map(|(end, J)| Some((end?, J.transpose())))
+                .collect();
+            inverse.quadratic(&blocks)
+        };
+        Ok(links.iter().map(uncertainty).collect())
     }
 
     /// Linearizes and solves.

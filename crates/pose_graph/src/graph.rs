@@ -81,16 +81,18 @@ impl PoseGraph {
                 });
             }
         }
-        let loose = held(self).iter().position(|held| !held);
+        let loose = held(self, |_| true).iter().position(|held| !held);
         loose.map_or(Ok(()), |node| Err(GraphError::Loose { node }))
     }
 }
 
-/// Whether each node has a way over links to a fixed one or a prior.
-fn held(graph: &PoseGraph) -> Vec<bool> {
+/// Whether each node has a way over links, of those with the numbers that `counts`, to a fixed one or
+/// a prior.
+pub fn held(graph: &PoseGraph, counts: impl Fn(usize) -> bool) -> Vec<bool> {
     let mut held = graph.fixed.clone();
     let mut neighbors = vec![Vec::new(); graph.poses.len()];
-    for link in &graph.links {
+    let links = graph.links.iter().enumerate();
+    for (_, link) in links.filter(|(index, _)| counts(*index)) {
         match link.from {
             None => held[link.to] = true,
             Some(from) => {

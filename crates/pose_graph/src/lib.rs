@@ -9,12 +9,16 @@ mod dogleg;
 mod equations;
 mod error;
 mod graph;
+mod motion;
 mod poses;
+mod readmission;
 mod robust;
 mod solve;
+mod supernodes;
 mod terms;
 #[cfg(test)]
 mod testing;
+mod voting;
 
 pub use error::GraphError;
 pub use graph::{GravityTerm, Link, PoseGraph};

@@ -12,7 +12,7 @@ use nalgebra::Isometry3;
 use crate::GraphError;
 use crate::dogleg::{Minimizer, Minimum, Stop};
 use crate::equations::chi2s;
-use crate::graph::PoseGraph;
+use crate::graph::{Link, PoseGraph};
 
 /// How false links are told.
 #[derive(Clone, Copy, Debug)]
@@ -29,7 +29,11 @@ pub struct Robust {
 const MAX_FINAL_STEPS: usize = 10;
 
 /// `rᵀΩr` of links that agree to a millionth of a standard deviation; less is rounding.
-const EXACT: f64 = 1e-12;
+pub const EXACT: f64 = 1e-12;
+
+/// The largest of ten million Gaussian residuals is this many times their 95th percentile; those of
+/// real links have longer tails, which [`Robust::max_ratio`] cuts.
+const MAX_TAIL_RATIO: f64 = 3.5;
 
 /// Change of the cost, as a share, at which the kernel at its final width has done its work.
 const SETTLED: f64 = 1e-2;
@@ -40,7 +44,8 @@ const ROUGHLY: Stop = Stop {
     min_relative_decrease: 0.03,
 };
 
-/// Finds which links are true; gives the poses reached and weights of 0 or 1.
+/// Finds which of the links `open` to belief are true, beginning at `poses`; gives the poses reached
+/// and weights of 0 or 1.
 ///
 /// `start` gives poses for weights that may be better than those given to it. False links fold a
 /// graph into poses from which no descent leads back, but the relaxation does not know of folds.
@@ -49,6 +54,8 @@ const ROUGHLY: Stop = Stop {
 /// As the minimization.
 pub fn anneal(
     graph: &PoseGraph,
+    open: &[bool],
+    poses: &[Isometry3<f64>],
     minimizer: &mut Minimizer,
     mut start: impl FnMut(&[Isometry3<f64>], &[f64]) -> Result<Vec<Isometry3<f64>>, GraphError>,
     robust: &Robust,
@@ -56,20 +63,21 @@ pub fn anneal(
     let mut step = |poses: &[Isometry3<f64>], weights: &[f64]| {
         minimizer.minimize(start(poses, weights)?, weights, ROUGHLY)
     };
-    let mut best = step(&graph.poses, &vec![1.0; graph.links.len()])?;
-    let mut residuals = Residuals::at(graph, &best);
+    let all: Vec<f64> = open.iter().map(|&o| f64::from(u8::from(o))).collect();
+    let mut best = step(poses, &all)?;
+    let mut residuals = Residuals::at(graph, open, &best.poses);
     // Convex from here on (Yang 2020, remark 5).
     let mut width = 2.0 * residuals.worst;
     let mut n_final_steps = 0;
     while n_final_steps < MAX_FINAL_STEPS {
-        let weights = residuals.weights(graph, |chi2| (width / (chi2 + width)).powi(2));
+        let weights = residuals.weights(graph, open, |chi2| (width / (chi2 + width)).powi(2));
         let moved = step(&best.poses, &weights)?;
-        let settled = (best.cost - moved.cost).abs() < SETTLED * best.cost;
+        let settled = (best.cost - moved.cost).abs() <= SETTLED * best.cost;
         best = Minimum {
             n_iterations: best.n_iterations + moved.n_iterations,
             ..moved
         };
-        residuals = Residuals::at(graph, &best);
+        residuals = Residuals::at(graph, open, &best.poses);
         // The median falls faster than the kernel may narrow, once the fold is undone.
         let narrowest = robust.kernel_width * residuals.median;
         if width <= narrowest {
@@ -80,34 +88,57 @@ pub fn anneal(
         }
         width = (width / robust.growth).max(narrowest);
     }
-    let limit = robust.max_ratio * residuals.median;
-    let weights = residuals.weights(graph, |chi2| f64::from(u8::from(chi2 <= limit)));
+    let weights = residuals.cut(graph, open, robust);
     Ok((best, weights))
 }
 
-/// `rᵀΩr` of all links, and of the doubtful ones the median and the largest.
-struct Residuals {
-    chi2: Vec<f64>,
-    median: f64,
+/// `rᵀΩr` of all links, and of the doubtful ones that are open to belief the median and the largest.
+pub struct Residuals {
+    /// Of all links.
+    pub chi2: Vec<f64>,
+    /// Of those that may be false.
+    pub median: f64,
+    /// 95 of 100 of those are no larger.
+    pub tail: f64,
     worst: f64,
 }
 
 impl Residuals {
-    fn at(graph: &PoseGraph, minimum: &Minimum) -> Self {
-        let chi2 = chi2s(graph, &minimum.poses);
-        let doubtful = graph.links.iter().zip(&chi2).filter(|(l, _)| !l.trusted);
+    /// The residuals at `poses`.
+    pub fn at(graph: &PoseGraph, open: &[bool], poses: &[Isometry3<f64>]) -> Self {
+        let chi2 = chi2s(graph, poses);
+        let links = graph.links.iter().zip(open).zip(&chi2);
+        let doubtful = links.filter(|((link, open), _)| !link.trusted && **open);
         let mut sorted: Vec<f64> = doubtful.map(|(_, c)| *c).collect();
         sorted.sort_unstable_by(f64::total_cmp);
         Self {
             chi2,
             median: sorted.get(sorted.len() / 2).map_or(EXACT, |m| m.max(EXACT)),
+            tail: sorted
+                .get(sorted.len() * 95 / 100)
+                .map_or(EXACT, |t| t.max(EXACT)),
             worst: sorted.last().copied().unwrap_or(0.0),
         }
     }
 
-    fn weights(&self, graph: &PoseGraph, kernel: impl Fn(f64) -> f64) -> Vec<f64> {
-        let weight =
-            |(link, chi2): (&crate::Link, &f64)| if link.trusted { 1.0 } else { kernel(*chi2) };
-        graph.links.iter().zip(&self.chi2).map(weight).collect()
+    /// Above it a link is false, where these are residuals of links that are believed.
+    pub fn limit(&self, robust: &Robust) -> f64 {
+        (robust.max_ratio * self.median).min(MAX_TAIL_RATIO * self.tail)
+    }
+
+    /// Weight 1 for links that are open and not false.
+    fn cut(&self, graph: &PoseGraph, open: &[bool], robust: &Robust) -> Vec<f64> {
+        let limit = robust.max_ratio * self.median;
+        self.weights(graph, open, |chi2| f64::from(u8::from(chi2 <= limit)))
+    }
+
+    fn weights(&self, graph: &PoseGraph, open: &[bool], kernel: impl Fn(f64) -> f64) -> Vec<f64> {
+        let links = graph.links.iter().zip(open).zip(&self.chi2);
+        let weight = |((link, open), chi2): ((&Link, &bool), &f64)| match (link.trusted, *open) {
+            (true, _) => 1.0,
+            (false, true) => kernel(*chi2),
+            (false, false) => 0.0,
+        };
+        links.map(weight).collect()
     }
 }

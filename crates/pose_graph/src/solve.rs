@@ -9,7 +9,8 @@ use crate::dogleg::{Minimizer, Minimum, Stop};
 use crate::equations::{chi2s, cost, structure};
 use crate::graph::PoseGraph;
 use crate::poses::numbered;
-use crate::robust::{self, Robust};
+use crate::readmission;
+use crate::robust::Robust;
 
 /// How a graph is solved.
 #[derive(Clone, Copy, Debug)]
@@ -74,31 +75,18 @@ fn minimum(
         max_iterations: settings.max_iterations,
         min_relative_decrease: settings.min_relative_decrease,
     };
+    if let Some(robust) = &settings.robust {
+        return readmission::believed(graph, numbers, stop, robust);
+    }
     let every = structure(graph, numbers, &all);
     let mut minimizer = Minimizer::new(graph, numbers, &every)?;
-    let mut relaxation = Relaxation::new(graph, numbers, &every)?;
-    let mut start =
-        |given: &[_], weights: &[f64]| cheaper(graph, given, relaxation.poses(weights)?, weights);
-    let Some(robust) = &settings.robust else {
-        let start = start(&graph.poses, &all)?;
-        return Ok((minimizer.minimize(start, &all, stop)?, all));
-    };
-    let (found, weights) = robust::anneal(graph, &mut minimizer, start, robust)?;
-    // False links join what is far apart: without them the factor is much smaller.
-    let some = structure(graph, numbers, &weights);
-    let last = Minimizer::new(graph, numbers, &some)?.minimize(found.poses, &weights, stop)?;
-    let n_iterations = found.n_iterations + last.n_iterations;
-    Ok((
-        Minimum {
-            n_iterations,
-            ..last
-        },
-        weights,
-    ))
+    let relaxed = Relaxation::new(graph, numbers, &every)?.poses(&all)?;
+    let start = cheaper(graph, &graph.poses, relaxed, &all)?;
+    Ok((minimizer.minimize(start, &all, stop)?, all))
 }
 
 /// Of two sets of poses the one that costs less.
-fn cheaper(
+pub fn cheaper(
     graph: &PoseGraph,
     given: &[Isometry3<f64>],
     relaxed: Vec<Isometry3<f64>>,
@@ -123,7 +111,7 @@ fn named(error: GraphError, numbers: &[Option<usize>]) -> GraphError {
 mod tests {
     use super::*;
     use crate::graph::{GravityTerm, Link};
-    use crate::testing::{drifted, farthest, helix};
+    use crate::testing::{drifted, farthest, helix, noisy_helix, with_false_links};
     use bentwing_trajectory::so3;
     use nalgebra::{Matrix6, Vector3, Vector6};
 
@@ -144,35 +132,9 @@ mod tests {
     /// The true graph, and the same with noisy measurements and poses that have drifted.
     fn noisy() -> (PoseGraph, PoseGraph) {
         let truth = helix(8, 20);
-        let mut graph = truth.clone();
-        for (k, link) in graph.links.iter_mut().enumerate() {
-            let wave = |i: usize| 0.005 * ((3 * k + i) as f64 * 1.7).sin();
-            let turn = so3::exp(&Vector3::new(wave(0), wave(1), wave(2)));
-            let shift = Vector3::new(wave(3), wave(4), wave(5)) * 4.0;
-            link.T_from_to *= Isometry3::from_parts(shift.into(), turn);
-        }
+        let mut graph = noisy_helix(8, 20);
         graph.poses = drifted(&graph, &Vector3::new(0.002, 0.001, 0.02));
         (truth, graph)
-    }
-
-    fn with_false_links(mut graph: PoseGraph, n: usize) -> PoseGraph {
-        let n_nodes = graph.poses.len();
-        let seen = graph.links[n_nodes].clone();
-        for k in 0..n {
-            let from = (37 * k) % n_nodes;
-            let to = (from + 30 + 11 * k) % n_nodes;
-            let ends = if from == to {
-                (0, n_nodes - 1)
-            } else {
-                (from, to)
-            };
-            graph.links.push(Link {
-                from: Some(ends.0),
-                to: ends.1,
-                ..seen.clone()
-            });
-        }
-        graph
     }
 
     #[test]

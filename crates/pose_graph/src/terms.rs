@@ -43,20 +43,36 @@ impl LinkAt {
         self.residual.dot(&(link.information * self.residual))
     }
 
-    /// Linearization for `R ← Exp(δr) R`, `p ← p + δt`.
+    /// The residual.
+    pub fn residual(&self) -> &Vector6<f64> {
+        &self.residual
+    }
+
+    /// Derivatives of the residual by the poses of `from` and `to`, for `R ← Exp(δr) R`,
+    /// `p ← p + δt`.
+    pub fn jacobians(&self, link: &Link, poses: &[Isometry3<f64>]) -> [Matrix6<f64>; 2] {
+        let J = self.jacobian_of_to(link, poses);
+        [-J * lever(link, poses), J]
+    }
+
+    /// Linearization for the same.
     pub fn linearize(&self, link: &Link, poses: &[Isometry3<f64>]) -> LinkEquations {
-        // Both perturbations of `to` act in its own frame after the turn by R_toᵀ.
-        let R = poses[link.to].rotation.to_rotation_matrix().into_inner();
-        let mut turn = Matrix6::zeros();
-        turn.fixed_view_mut::<3, 3>(0, 0).copy_from(&R.transpose());
-        turn.fixed_view_mut::<3, 3>(3, 3).copy_from(&R.transpose());
-        let J = se3::right_jacobian_inverse(&self.error) * turn;
+        let J = self.jacobian_of_to(link, poses);
         let weighted = link.information * J;
         LinkEquations {
             information: J.tr_mul(&weighted),
             gradient: weighted.tr_mul(&self.residual),
             lever: lever(link, poses),
         }
+    }
+
+    fn jacobian_of_to(&self, link: &Link, poses: &[Isometry3<f64>]) -> Matrix6<f64> {
+        // Both perturbations of `to` act in its own frame after the turn by R_toᵀ.
+        let R = poses[link.to].rotation.to_rotation_matrix().into_inner();
+        let mut turn = Matrix6::zeros();
+        turn.fixed_view_mut::<3, 3>(0, 0).copy_from(&R.transpose());
+        turn.fixed_view_mut::<3, 3>(3, 3).copy_from(&R.transpose());
+        se3::right_jacobian_inverse(&self.error) * turn
     }
 }
 

@@ -82,6 +82,50 @@ pub fn helix(n_turns: usize, per_turn: usize) -> PoseGraph {
     }
 }
 
+/// The helix with measurements that are off by some millimetres and milliradians.
+pub fn noisy_helix(n_turns: usize, per_turn: usize) -> PoseGraph {
+    let mut graph = helix(n_turns, per_turn);
+    for (k, link) in graph.links.iter_mut().enumerate() {
+        let wave = |i: usize| 0.005 * ((3 * k + i) as f64 * 1.7).sin();
+        let turn = so3::exp(&Vector3::new(wave(0), wave(1), wave(2)));
+        let shift = Vector3::new(wave(3), wave(4), wave(5)) * 4.0;
+        link.T_from_to *= Isometry3::from_parts(shift.into(), turn);
+    }
+    graph
+}
+
+/// `n` links between nodes that are far apart, all with what one of the loop links has measured.
+pub fn with_false_links(mut graph: PoseGraph, n: usize) -> PoseGraph {
+    let n_nodes = graph.poses.len();
+    let seen = graph.links[n_nodes].clone();
+    for k in 0..n {
+        let from = (37 * k) % n_nodes;
+        let to = (from + 30 + 11 * k) % n_nodes;
+        let ends = if from == to {
+            (0, n_nodes - 1)
+        } else {
+            (from, to)
+        };
+        graph.links.push(Link {
+            from: Some(ends.0),
+            to: ends.1,
+            ..seen.clone()
+        });
+    }
+    graph
+}
+
+/// What a doubtful link between two nodes of a graph with true poses measures.
+pub fn true_link(truth: &PoseGraph, from: usize, to: usize) -> Link {
+    Link {
+        from: Some(from),
+        to,
+        T_from_to: truth.poses[from].inv_mul(&truth.poses[to]),
+        trusted: false,
+        ..truth.links[0].clone()
+    }
+}
+
 /// The poses that only the links in time give, with a drift of `turn` rad per link.
 pub fn drifted(graph: &PoseGraph, turn: &Vector3<f64>) -> Vec<Isometry3<f64>> {
     let mut poses = vec![graph.poses[0]];

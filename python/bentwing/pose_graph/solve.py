@@ -23,8 +23,9 @@ class RobustSettings:
     Attributes
     ----------
     kernel_width : medians at which the kernel has lost three quarters of its weight
-    max_ratio : medians above which a link is false in the end; smaller where true links are
-        rejected less often than false ones accepted
+    max_ratio : medians above which a link is false in the end, and beyond which links between
+        neighbours of the same two nodes disagree; smaller where true links are rejected less often than
+        false ones accepted. Where the believed links have no long tail, less is enough
     growth : factor by which the kernel narrows from step to step, above 1; nearer to 1 is slower
         and less easily misled
     """
@@ -95,7 +96,8 @@ def solve(graph: PoseGraph, settings: SolveSettings | None = None) -> Solution:
     """Find the poses that agree best with the links, and the links that are false.
 
     The search begins at the given poses or at those of the chordal relaxation, whichever cost
-    less, and takes Powell's dog-leg steps. Links that are not trusted may be rejected.
+    less, and takes Powell's dog-leg steps. Links that are not trusted may be rejected: first only those
+    are tried that links nearby vouch for, then those that do not contradict what these have told.
 
     Parameters
     ----------
@@ -114,7 +116,8 @@ def solve(graph: PoseGraph, settings: SolveSettings | None = None) -> Solution:
     References
     ----------
     Carlone et al. 2015, Initialization techniques for 3D SLAM; Yang et al. 2020, Graduated
-    non-convexity for robust spatial perception; Nocedal and Wright 2006, section 4.1.
+    non-convexity for robust spatial perception; Mangelson et al. 2018, Pairwise consistent measurement
+    set maximization; Nocedal and Wright 2006, section 4.1.
     """
     result = _core.solve_pose_graph(
         graph.positions,

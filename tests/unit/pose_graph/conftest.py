@@ -3,11 +3,17 @@
 
 from __future__ import annotations
 
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from bentwing import geometry
 from bentwing.pose_graph import Links, PoseGraph
+
+# What makes links false is shared with the bench.
+sys.path.append(str(Path(__file__).resolve().parents[3] / "benches"))
 
 
 @pytest.fixture

@@ -44,8 +44,9 @@ class MatchSettings:
     min_overlap : share of the smaller place that the other one has too
     min_agreement : share of what both could see that both saw alike; 0.05 less without planes, as
         leaves look different from everywhere
-    min_blind_agreement : the same where it is not known of both what they saw through; 0.05 more
-        without planes
+    min_sure_agreement : the same where less than `wide_overlap` is shared, where it is not known of
+        both what they saw through, and where no other match says the same; 0.05 more without planes
+    wide_overlap : share of the smaller place from which the lesser agreement is enough
     max_conflict : share of what one place saw where the other saw through; tells apart what is built
         alike but furnished differently
     max_leafy_conflict : the same where there are no planes: leaves let some beams through
@@ -62,7 +63,8 @@ class MatchSettings:
     min_inliers: int = 4
     min_overlap: float = 0.25
     min_agreement: float = 0.7
-    min_blind_agreement: float = 0.8
+    min_sure_agreement: float = 0.8
+    wide_overlap: float = 0.35
     max_conflict: float = 0.006
     max_leafy_conflict: float = 0.03
     max_distance: float = 0.025

@@ -85,16 +85,23 @@ class Agreement:
             )
         return None
 
+    def is_sure(self, settings: MatchSettings) -> bool:
+        """Whether the places agree so well that nothing else need speak for it."""
+        return self.agreement >= settings.min_sure_agreement + self._planeless()
+
     def _needed(self, settings: MatchSettings) -> float:
         """Agreement that is needed.
 
-        Without planes nothing is compared sharply. Places of which that is known then contradict each other by
-        what they saw through, ten times as much as true ones do; others must agree the more.
+        Without planes nothing is compared sharply. Places that share much, and of which it is known
+        what they saw through, then contradict each other by that, ten times as much as true ones do;
+        others must agree the more.
         """
-        planeless = _PLANELESS if np.isnan(self.distance) else 0.0
-        if self.blind:
-            return settings.min_blind_agreement + planeless
-        return settings.min_agreement - planeless
+        if self.blind or self.overlap < settings.wide_overlap:
+            return settings.min_sure_agreement + self._planeless()
+        return settings.min_agreement - self._planeless()
+
+    def _planeless(self) -> float:
+        return _PLANELESS if np.isnan(self.distance) else 0.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -38,10 +38,11 @@ def test_a_hall_in_which_half_of_the_things_stand_elsewhere_is_kept_apart(places
 
 def test_what_was_not_seen_through_must_agree_the_more():
     settings = MatchSettings()
-    agreement = 0.5 * (settings.min_agreement + settings.min_blind_agreement)
+    agreement = 0.5 * (settings.min_agreement + settings.min_sure_agreement)
     sighted = Agreement(0.5, agreement, 0.0, 0.1, 200, 0.01)
     assert sighted.objection(settings) is None
     assert "agreement" in replace(sighted, blind=True, conflict=np.nan).objection(settings)
+    assert "agreement" in replace(sighted, overlap=0.3).objection(settings)
 
 
 def test_leaves_may_let_beams_through_and_walls_may_not():

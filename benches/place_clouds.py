@@ -21,8 +21,10 @@ if TYPE_CHECKING:
 
 DRIFT = 0.002
 """m per square root of a second, each axis: a random walk."""
-THINNING = 4
-"""Of so many beams, one is cast."""
+THINNING = {"hokuyo-spin": 1, "vlp16-motor": 12, "vlp16-fixed": 12}
+"""Of so many beams, one is cast: what is left is still as much as a place holds of it."""
+THINNING_FAR = 4
+"""The same where few beams return: over towns and before dams."""
 POSE_STEP = 0.1
 
 
@@ -48,11 +50,13 @@ def simulated_run(scenario: Scenario) -> SimulatedRun:
     setup = prepare(scenario)
     ranger, rig = replace(setup.sensors.ranger, movers=()), setup.rig
     points, times = [], []
+    far = scenario.scene in {"town", "dam"}
+    thinning = THINNING_FAR if far else THINNING[scenario.head]
     for start in np.arange(setup.first, setup.last, 1.0):
         beams = rig.head.lidar.beams(start, min(start + 1.0, setup.last))
         if beams is None:
             continue
-        keep = np.s_[::THINNING] if beams.sweep_axis == 0 else np.s_[:, ::THINNING]
+        keep = np.s_[::thinning] if beams.sweep_axis == 0 else np.s_[:, ::thinning]
         beams = replace(beams, times=beams.times[keep], directions=beams.directions[keep])
         ranges, _ = ranger.measure(beams)
         ok = np.isfinite(ranges) & (ranges > 0.4)
@@ -112,6 +116,10 @@ FLIGHTS = (
     FlightKind("mine", ("hokuyo-spin",), 50.0),
     FlightKind("town", ("vlp16-motor",), 58.0),
     FlightKind("dam", ("vlp16-motor",), 30.0, "survey"),
+    FlightKind("compound", ("hokuyo-spin", "vlp16-fixed"), 40.0),
+    FlightKind("mocap", ("vlp16-motor", "hokuyo-spin"), 30.0),
+    FlightKind("carpark", ("vlp16-motor",), 40.0),
+    FlightKind("campus", ("vlp16-motor",), 40.0),
 )
 
 

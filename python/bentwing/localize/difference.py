@@ -29,6 +29,8 @@ _SPACING = 0.1
 _LOOK = 50_000
 # What fewer looks saw through may lie behind an edge.
 _MIN_LOOKS = 4
+# Beams of a look that are followed, and the voxels of what they pass, m.
+_BEAMS, _LOOKED = 6000, 0.4
 # New points are kept this much apart, m, and changed ones believed with so many others within a radius, m.
 _FINE = 0.05
 _TOGETHER = 0.3
@@ -91,7 +93,7 @@ def looks(points: NDArray[np.float64], origins: NDArray[np.float64]) -> list[Fre
     """Tell what the beams from `origins` to `points`, (N, 3) m in order of time, went through."""
     n = max(1, round(len(points) / _LOOK))
     parts = zip(np.array_split(points, n), np.array_split(origins, n), strict=True)
-    return [seen_through(p, o) for p, o in parts if len(p)]
+    return [seen_through(p, o, voxel=_LOOKED, most_beams=_BEAMS) for p, o in parts if len(p)]
 
 
 class Difference:

@@ -117,10 +117,11 @@ def consistent(matches: Sequence[Match]) -> list[Match]:
     """Reject the matches of two parts that contradict the largest group that agrees.
 
     A match is compared by where it puts the place of another one (Mangelson et al. 2018, pairwise
-    consistency). Where two equally large groups contradict each other neither is believed.
+    consistency). Where two equally large groups contradict each other neither is believed, nor is a
+    match that nothing else speaks for if it is not sure by itself.
     """
     believed = [k for k, m in enumerate(matches) if m.believed]
-    if len(believed) < 2:
+    if not believed:
         return list(matches)
     agree = np.array([[_agree(matches[p], matches[q]) for q in believed] for p in believed])
     kept = _largest_group(agree)
@@ -138,7 +139,20 @@ def consistent(matches: Sequence[Match]) -> list[Match]:
         result[k] = matches[k].rejected(
             f"contradicts {n_against} of the {int(kept.sum())} matches of these two that agree"
         )
+    if kept.sum() == 1:
+        lone = believed[int(np.argmax(kept))]
+        result[lone] = _alone(matches[lone])
     return result
+
+
+def _alone(match: Match) -> Match:
+    """Believe a match that no other supports only if it is sure by itself."""
+    agreement = match.candidate.agreement
+    if agreement is None or agreement.is_sure(MatchSettings()):
+        return match
+    return match.rejected(
+        f"agreement is {agreement.agreement:.3g}, too little for the only match of these two"
+    )
 
 
 def _agree(p: Match, q: Match) -> bool:

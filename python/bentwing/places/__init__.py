@@ -8,12 +8,13 @@ the reason why it was believed or not.
 
 from __future__ import annotations
 
-from bentwing.places.cut import Part, cut_places, describe_parts, describe_run, positions_at
+from bentwing.places.cut import cut_places, describe_parts, describe_run, positions_at
 from bentwing.places.free_space import FreeSpace, seen_through
 from bentwing.places.from_run import RunMap, map_of_run, places_of_cloud, places_of_run
 from bentwing.places.link import PlaceLink, link_between
 from bentwing.places.match import Candidate, match_places
 from bentwing.places.metric import Metric, default_metric, learn_metric
+from bentwing.places.part import Part
 from bentwing.places.place import Place, make_place
 from bentwing.places.refine import Alignment
 from bentwing.places.settings import MatchSettings, PlaceSettings

@@ -3,39 +3,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bentwing.places.part import MIN_POINTS, Part
 from bentwing.places.place import Place, make_place
 from bentwing.places.settings import PlaceSettings
+from bentwing.places.tiles import tiled
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterable
 
     from numpy.typing import NDArray
 
     from bentwing.trajectory import Trajectory
 
-MIN_POINTS = 500  # a place of fewer says nothing
 PAUSE = 2.0  # s without points, after which another place begins
-
-
-@dataclass(frozen=True, slots=True)
-class Part:
-    """Points of one place: those of a span of time, or of a tile.
-
-    Attributes
-    ----------
-    points : (N, 3) m, map frame
-    span : s, of the points; None where they have no times
-    origins : (N, 3) m, where each was measured from; None where that is unknown
-    """
-
-    points: NDArray[np.float64]
-    span: tuple[float, float] | None
-    origins: NDArray[np.float64] | None
 
 
 def cut_places(
@@ -62,7 +46,7 @@ def cut_places(
     settings = settings or PlaceSettings()
     _check(points, times)
     if times is None:
-        return list(_tiles(points, settings.tile))
+        return list(tiled(lambda: [points], settings))
     order = np.argsort(times, kind="stable")
     points, times = points[order], times[order]
     if trajectory is not None:
@@ -136,22 +120,6 @@ def _way(trajectory: Trajectory | None, start: float, end: float) -> float:
         return 0.0
     at = np.linspace(start, end, max(2, int(end - start) + 1))
     return float(np.linalg.norm(np.diff(positions_at(trajectory, at), axis=0), axis=1).sum())
-
-
-def _tiles(points: NDArray[np.float64], tile: float) -> Iterator[Part]:
-    """One part if the points lie within two tiles, else one per square tile seen from above."""
-    if not len(points):
-        return
-    middle = np.median(points[:, :2], axis=0)
-    if (np.quantile(np.abs(points[:, :2] - middle), 0.95, axis=0) <= tile).all():
-        yield Part(points, None, None)
-        return
-    cells = np.floor((points[:, :2] - middle) / tile + 0.5).astype(np.int64)
-    order = np.lexsort(cells.T)
-    changes = np.flatnonzero((np.diff(cells[order], axis=0) != 0).any(axis=1)) + 1
-    for rows in np.split(order, changes):
-        if len(rows) >= MIN_POINTS:
-            yield Part(points[rows], None, None)
 
 
 def _check(points: NDArray[np.float64], times: NDArray[np.float64] | None) -> None:

@@ -11,9 +11,11 @@ import numpy as np
 
 from bentwing.errors import UsageError
 from bentwing.map.gps_time import adjusted_gps_origin
-from bentwing.map.read import MAP_SUFFIXES, read_parts, read_points
-from bentwing.places.cut import describe_parts, describe_run
+from bentwing.map.read import MAP_SUFFIXES, read_parts
+from bentwing.places.cut import describe_parts
+from bentwing.places.settings import PlaceSettings
 from bentwing.places.stream import PartStream
+from bentwing.places.tiles import tiled
 from bentwing.run_folder import read_record
 from bentwing.trajectory import Trajectory, read_tum
 
@@ -23,7 +25,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bentwing.places.place import Place
-    from bentwing.places.settings import PlaceSettings
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,6 +112,8 @@ def places_of_cloud(
 ) -> list[Place]:
     """Describe the places of a gravity-aligned cloud without a run: the whole of it, or tiles.
 
+    The file is read three times or more, and never held as a whole.
+
     Parameters
     ----------
     shift : (3,) m, taken off the coordinates of a cloud far from its origin
@@ -120,6 +123,11 @@ def places_of_cloud(
     InputError
         If the file cannot be read.
     """
-    points = read_points(Path(path))
-    points = points[np.isfinite(points).all(axis=1)]
-    return describe_run(points if shift is None else points - shift, settings=settings)
+    settings = settings or PlaceSettings()
+
+    def chunks() -> Iterator[NDArray[np.float64]]:
+        for part in read_parts(Path(path)):
+            points = part.points[np.isfinite(part.points).all(axis=1)]
+            yield points if shift is None else points - shift
+
+    return describe_parts(tiled(chunks, settings), settings)

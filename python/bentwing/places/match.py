@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from bentwing.places.place import Place
 
 _WORTH_REFINING = 0.6  # agreement after the coarse alignment
+# Transforms closer than this, m, in the middle of a place and so far from it, m, are one.
+_SAME, _ARM = 0.1, 10.0
 _FAR = "too few surfels are near each other"
 
 
@@ -113,11 +115,12 @@ def _tried(
     proposed = hypotheses(a, b, metric, settings.n_hypotheses)
     promising = [h for h in proposed if h.n_inliers >= settings.min_inliers]
     promising.sort(key=lambda h: -quick_score(a, trees[0], b.surfels, h.T_a_b))
+    known: list[NDArray[np.float64]] = []
     for hypothesis in promising[: settings.n_refined]:
-        tried = _judged(named, places, trees, hypothesis, settings)
-        if best is None or _merit(tried) > _merit(best):
+        tried = _judged(named, places, trees, hypothesis, settings, known=known)
+        if tried is not None and (best is None or _merit(tried) > _merit(best)):
             best = tried
-        if best.accepted:
+        if best is not None and best.accepted:
             break
     if best is None:
         most = max((h.n_inliers for h in proposed), default=0)
@@ -132,19 +135,34 @@ def _judged(
     trees: tuple[cKDTree, cKDTree],
     hypothesis: Hypothesis,
     settings: MatchSettings,
-) -> Candidate:
+    *,
+    known: list[NDArray[np.float64]],
+) -> Candidate | None:
+    """Refine a hypothesis and verify it; None where it becomes one of those `known`, which it joins."""
     a, b = places
     alignment = refine(a.surfels, trees[0], b.surfels, hypothesis.T_a_b, COARSE)
     if alignment is None:
         return Candidate(*named, _FAR, hypothesis.n_inliers)
+    if any(_alike(alignment.T_a_b, T, b.centre) for T in known):
+        return None
+    known.append(alignment.T_a_b)
     agreement = verify(a, b, trees, alignment.T_a_b)
-    if agreement.agreement > _WORTH_REFINING:
+    # a finer alignment takes most of the time, and does not move what stands in the way
+    hopeless = agreement.conflict > max(settings.max_conflict, settings.max_leafy_conflict)
+    if agreement.agreement > _WORTH_REFINING and not hopeless:
         finer = refine(a.surfels, trees[0], b.surfels, alignment.T_a_b, FINE)
         if finer is None:
             return Candidate(*named, _FAR, hypothesis.n_inliers)
         alignment, agreement = finer, verify(a, b, trees, finer.T_a_b)
     reason = agreement.objection(settings) or _leaning(alignment.T_a_b)
     return Candidate(*named, reason, hypothesis.n_inliers, alignment, agreement)
+
+
+def _alike(one: NDArray[np.float64], other: NDArray[np.float64], at: NDArray[np.float64]) -> bool:
+    """Whether two transforms put the middle of a place, and what is 10 m around, to the same place."""
+    change = one - other
+    shift = float(np.linalg.norm(change[:3, :3] @ at + change[:3, 3]))
+    return shift + _ARM * float(np.linalg.norm(change[:3, :3])) < _SAME
 
 
 def _leaning(T_a_b: NDArray[np.float64], most: float = np.radians(3.0)) -> str | None:

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing.places.cut import MIN_POINTS, PAUSE, Part, place_starts, positions_at
+from bentwing.places.cut import PAUSE, place_starts, positions_at
+from bentwing.places.part import MIN_POINTS, Part
 from bentwing.places.settings import PlaceSettings
 
 if TYPE_CHECKING:

@@ -25,10 +25,12 @@ _ALIKE = 9.0  # squared standard deviations between two surfels of the same surf
 _FLAT = 0.85  # |n_z| of floors, ceilings and ground: upright places always agree on them
 _PLANAR = 0.6
 _QUICK = 300  # surfels of a quick look
+_DAMNING = 6.0  # how much more a surfel in free space says than one where it should be
 _SIMILAR = np.cos(np.radians(30.0))
 _CLOSE = 0.3  # m, across a plane
 _THIN = 0.03  # m, standard deviation of a plane's points across it
 _MIN_PLANES = 30  # for their median distance to mean something
+_PLANELESS = 0.05  # of agreement, that is needed more or less without planes
 _MIN_SURFELS = 80  # that are not flat, for shares to mean anything
 
 
@@ -48,6 +50,7 @@ class Agreement:
         (some direction is free) and 1/4
     n_alike : surfels that are alike
     distance : m, median distance across the planes of surfels near each other; NaN without planes
+    blind : whether of one of the places it is not known what was seen through
     """
 
     overlap: float
@@ -56,6 +59,7 @@ class Agreement:
     conditioning: float
     n_alike: int
     distance: float
+    blind: bool = False
 
     def objection(self, settings: MatchSettings) -> str | None:
         """Why the places are not believed to be the same, or None if they are."""
@@ -73,16 +77,31 @@ class Agreement:
                 f"planes are {1000 * self.distance:.0f} mm apart, "
                 f"{1000 * settings.max_distance:.0f} mm are allowed"
             )
-        if self.conflict > settings.max_conflict:
+        most = settings.max_leafy_conflict if np.isnan(self.distance) else settings.max_conflict
+        if self.conflict > most:
             return (
                 f"{self.conflict:.1%} stand where the other place saw through, "
-                f"{settings.max_conflict:.1%} are allowed"
+                f"{most:.1%} are allowed"
             )
         return None
 
+    def is_sure(self, settings: MatchSettings) -> bool:
+        """Whether the places agree so well that nothing else need speak for it."""
+        return self.agreement >= settings.min_sure_agreement + self._planeless()
+
     def _needed(self, settings: MatchSettings) -> float:
-        """Agreement that is needed: more where there are no planes to compare sharply."""
-        return settings.min_agreement + (0.05 if np.isnan(self.distance) else 0.0)
+        """Agreement that is needed.
+
+        Without planes nothing is compared sharply. Places that share much, and of which it is known
+        what they saw through, then contradict each other by that, ten times as much as true ones do;
+        others must agree the more.
+        """
+        if self.blind or self.overlap < settings.wide_overlap:
+            return settings.min_sure_agreement + self._planeless()
+        return settings.min_agreement - self._planeless()
+
+    def _planeless(self) -> float:
+        return _PLANELESS if np.isnan(self.distance) else 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,22 +132,23 @@ def verify(
         sum(int(getattr(view, name).sum()) for view in views)
         for name in ("alike", "seen", "conflicting")
     )
-    known = a.free is not None or b.free is not None
+    known = [place.free is not None for place in (a, b)]
     return Agreement(
         overlap=max(float(view.alike.mean()) if len(view.alike) else 0.0 for view in views),
         agreement=alike / max(seen, 1),
-        conflict=conflicting / max(seen, 1) if known else float("nan"),
+        conflict=conflicting / max(seen, 1) if any(known) else float("nan"),
         conditioning=_conditioning(views[0]),
         n_alike=min(int(view.alike.sum()) for view in views),
         distance=_median(np.concatenate([view.distances for view in views])),
+        blind=not all(known),
     )
 
 
 def quick_score(place: Place, tree: cKDTree, surfels: Surfels, T: NDArray[np.float64]) -> float:
     """How well a transform that is not yet refined puts some surfels of another place into `place`.
 
-    The share that comes near a surfel with a similar normal, less the share that ends where the
-    place saw through, between -1 and 1.
+    The share that comes near a surfel with a similar normal, less `_DAMNING` times the share that
+    ends where the place saw through: rooms that are built alike have much in common.
     """
     upright = np.flatnonzero(np.abs(surfels.normals[:, 2]) < _FLAT)
     some = upright[:: -(-len(upright) // _QUICK) or 1]
@@ -144,7 +164,7 @@ def quick_score(place: Place, tree: cKDTree, surfels: Surfels, T: NDArray[np.flo
     across = np.abs(np.einsum("ni,ni->n", offsets, place.surfels.normals[nearest[near]]))
     similar = (cosines > _SIMILAR) & (across < _CLOSE)
     through = 0 if place.free is None else int(place.free.contains(moved[~near]).sum())
-    return float(similar.sum() - through) / len(some)
+    return float(similar.sum() - _DAMNING * through) / len(some)
 
 
 def _median(values: NDArray[np.float64]) -> float:

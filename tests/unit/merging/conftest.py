@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from bentwing.merging.matches import Match, Part
-from bentwing.places import Alignment, Candidate
+from bentwing.places import Agreement, Alignment, Candidate
 from bentwing.places.transform import inverse, upright
 from bentwing.trajectory import Trajectory
 
@@ -40,13 +40,14 @@ def corridor():
     }
     T_0_1 = inverse(frames[1])
 
-    def match(i, j, shift=(0.0, 0.0, 0.0)):
+    def match(i, j, shift=(0.0, 0.0, 0.0), agreement=0.9):
         T = T_0_1.copy()
         T[:3, 3] += shift
         a, b = places[Part(0, 0)][i], places[Part(1, 0)][j]
         information = np.diag([1e6] * 3 + [1e6] * 3)
         alignment = Alignment(T, information, a.centre, 500)
-        candidate = Candidate(i, j, 100.0, None, 20, alignment)
+        said = Agreement(0.6, agreement, 0.0, 0.1, 300, 0.005)
+        candidate = Candidate(i, j, 100.0, None, 20, alignment, said)
         return Match(Part(0, 0), Part(1, 0), candidate, a, b, None)
 
     return SimpleNamespace(

@@ -58,6 +58,16 @@ def test_two_matches_that_contradict_each_other_are_both_rejected(corridor):
     assert len(groups) == 2
 
 
+def test_a_match_that_is_not_sure_needs_another_that_says_the_same(corridor):
+    unsure = [corridor.match(k, k, agreement=0.75) for k in range(2)]
+    assert all(m.believed for m in consistent(unsure))
+    (judged,) = consistent(unsure[:1])
+    assert not judged.believed
+    assert "only match" in judged.reason
+    contradicted = [unsure[0], corridor.match(3, 3, (0.0, 5.0, 0.0), agreement=0.75)]
+    assert not any(m.believed for m in consistent(contradicted))
+
+
 def test_the_graph_finds_a_false_match_by_itself(corridor):
     given = [corridor.match(k, k) for k in range(5)] + [corridor.match(5, 2, (4.0, 0.0, 0.0))]
     (group,), matches = placed(corridor, given)

@@ -14,11 +14,17 @@ SIZE = np.array([18.0, 13.0, 5.0])
 T_B_WORLD = upright(2.1, np.array([-7.0, 31.0, 4.0]))
 
 
-def hall(seed, n_boxes=18):
-    """Corners (low, high) of boxes in a hall; the first is the hall itself, seen from inside."""
+def hall(seed, n_boxes=18, changed=0):
+    """Corners (low, high) of boxes in a hall; the first is the hall itself, seen from inside.
+
+    The first `changed` boxes stand where another seed puts them.
+    """
     rng = np.random.default_rng(seed)
     low = np.column_stack([rng.uniform(1.0, SIZE[:2] - 2.5, (n_boxes, 2)), np.zeros(n_boxes)])
     high = low + rng.uniform((0.4, 0.4, 0.5), (1.5, 1.5, 3.5), (n_boxes, 3))
+    if changed:
+        others = hall(seed + 1000, changed)
+        low[:changed], high[:changed] = others[0][1:], others[1][1:]
     return np.vstack([np.zeros(3), low]), np.vstack([SIZE, high])
 
 
@@ -34,7 +40,7 @@ def cast(origins, directions, boxes):
 
 
 @functools.cache
-def seen(seed, path, n=60_000, seconds=10.0):
+def seen(seed, path, n=60_000, seconds=10.0, changed=0):
     """Points, times and trajectory of a scanner on the way `path`, in the hall's frame."""
     rng = np.random.default_rng([seed, path])
     times = np.linspace(0.0, seconds, n)
@@ -44,7 +50,7 @@ def seen(seed, path, n=60_000, seconds=10.0):
     origins = np.column_stack([np.interp(times, track, positions[:, i]) for i in range(3)])
     directions = rng.normal(size=(n, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    ranges = cast(origins, directions, hall(seed)) + rng.normal(0.0, 0.01, n)
+    ranges = cast(origins, directions, hall(seed, changed=changed)) + rng.normal(0.0, 0.01, n)
     upright_quats = np.tile([0.0, 0.0, 0.0, 1.0], (101, 1))
     trajectory = Trajectory(track, positions, upright_quats)
     return origins + ranges[:, None] * directions, times, trajectory

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from bentwing.places import MatchSettings, describe_run, match_places
+from bentwing.places import Agreement, MatchSettings, describe_run, match_places
 from bentwing.places.transform import apply, inverse
 
 from .conftest import T_B_WORLD, moved, seen
@@ -23,6 +25,33 @@ def test_halls_of_the_same_size_with_other_things_in_them_are_kept_apart(places_
     assert len(candidates) == 1
     assert not candidates[0].accepted
     assert candidates[0].reason
+
+
+def test_a_hall_in_which_half_of_the_things_stand_elsewhere_is_kept_apart(places_a):
+    """As a car park of the same building on another day: most of it agrees."""
+    other = describe_run(*moved(*seen(3, 1, changed=9), T_B_WORLD))
+    (found,) = match_places(places_a, other)
+    assert not found.accepted
+    assert "saw through" in found.reason
+    assert found.agreement.agreement > MatchSettings().min_agreement
+
+
+def test_what_was_not_seen_through_must_agree_the_more():
+    settings = MatchSettings()
+    agreement = 0.5 * (settings.min_agreement + settings.min_sure_agreement)
+    sighted = Agreement(0.5, agreement, 0.0, 0.1, 200, 0.01)
+    assert sighted.objection(settings) is None
+    assert "agreement" in replace(sighted, blind=True, conflict=np.nan).objection(settings)
+    assert "agreement" in replace(sighted, overlap=0.3).objection(settings)
+
+
+def test_leaves_may_let_beams_through_and_walls_may_not():
+    settings = MatchSettings()
+    conflict = 0.5 * (settings.max_conflict + settings.max_leafy_conflict)
+    leaves = Agreement(0.5, 0.68, conflict, 0.1, 200, np.nan)
+    assert leaves.objection(settings) is None
+    walls = replace(leaves, agreement=0.9, distance=0.01)
+    assert "saw through" in walls.objection(settings)
 
 
 def test_points_without_times_are_matched_too(places_b):

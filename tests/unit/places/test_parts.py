@@ -56,7 +56,32 @@ def test_free_space_is_along_the_beams_and_not_at_their_ends():
     points = np.column_stack([np.full(200, 8.0), np.linspace(-3, 3, 200), np.zeros(200)])
     free = seen_through(points, np.zeros((200, 3)))
     assert free.contains(np.array([[4.0, 0.0, 0.0], [2.0, 0.3, 0.0]])).all()
-    assert not free.contains(np.array([[8.0, 0.0, 0.0], [7.7, 1.0, 0.0], [4.0, 6.0, 0.0]])).any()
+    assert not free.contains(np.array([[8.0, 0.0, 0.0], [7.8, 1.0, 0.0], [4.0, 6.0, 0.0]])).any()
+
+
+def test_free_space_is_what_was_passed_and_is_not_beside_a_point():
+    rng = np.random.default_rng(5)
+    origins = rng.uniform(-1.0, 1.0, (400, 3))
+    points = origins + rng.normal(0.0, 3.0, (400, 3))
+    free = seen_through(points, origins, voxel=0.5)
+    # slowly: where the beams were at every voxel's length, without the neighbours of all points
+    steps = [
+        o + k * 0.5 * (p - o) / np.linalg.norm(p - o)
+        for o, p in zip(origins, points, strict=True)
+        for k in range(int(np.linalg.norm(p - o) / 0.5))
+    ]
+    passed = {tuple(c) for c in np.floor(np.array(steps) / 0.5).astype(int).tolist()}
+    filled = np.floor(points / 0.5).astype(int)
+    expected = {c for c in passed if (np.abs(filled - c).max(axis=1) > 1).all()}
+    cells = np.stack(np.meshgrid(*[np.arange(-30, 31)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    found = cells[free.contains((cells + 0.5) * 0.5)]
+    assert len(expected) > 500
+    assert {tuple(c) for c in found.tolist()} == expected
+
+
+def test_no_beam_longer_than_a_voxel_leaves_no_free_space():
+    points = np.random.default_rng(6).normal(size=(50, 3))
+    assert not seen_through(points, points + 0.01).contains(points + 1.0).any()
 
 
 def test_a_run_is_cut_by_time_and_at_pauses():

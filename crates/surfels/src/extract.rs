@@ -118,11 +118,8 @@ pub fn extract(
         .last()
         .zip(points.stamps.first())
         .map_or(0.0, |(b, a)| b - a);
-    limit(
-        set,
-        &ranks,
-        (settings.max_rate * duration.max(MIN_DURATION)) as usize,
-    )
+    let budget = (settings.max_rate * duration.max(MIN_DURATION)) as usize;
+    limit(set, &ranks, budget).shrunk()
 }
 
 /// Keeps at most `budget` surfels: levels with few keep all of theirs, the others share the rest.

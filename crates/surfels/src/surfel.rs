@@ -45,6 +45,17 @@ impl SurfelSet {
         self.level_starts[level]..self.level_starts[level + 1]
     }
 
+    /// Gives back what the vectors hold beyond their contents; sets are kept for hours.
+    pub(crate) fn shrunk(mut self) -> Self {
+        self.means.shrink_to_fit();
+        self.covariances.shrink_to_fit();
+        self.normals.shrink_to_fit();
+        self.stamps.shrink_to_fit();
+        self.angles.shrink_to_fit();
+        self.n_points.shrink_to_fit();
+        self
+    }
+
     /// The surfels that `keep` marks.
     pub(crate) fn filtered(self, keep: &[bool]) -> Self {
         fn kept<T>(values: Vec<T>, keep: &[bool]) -> Vec<T> {

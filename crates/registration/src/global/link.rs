@@ -63,13 +63,16 @@ pub struct Link {
 impl Link {
     /// Nearest neighbours that found each other, on every level.
     pub fn find(&self, a: &Laid, b: &Laid, settings: &Settings) -> Vec<LinkMatch> {
-        let mut found = Vec::new();
-        for level in 0..a.searched.grids.len().min(b.searched.grids.len()) {
-            let first = [a, b].map(|laid| laid.placed.level_starts[level] as u32);
-            for (i, j) in self.pairs(a, b, level, settings) {
-                let (i, j) = ((first[0] + i) as usize, (first[1] + j) as usize);
-                found.push(LinkMatch::between(a, i, b, j, settings.range_sigma));
-            }
+        let levels = 0..a.searched.grids.len().min(b.searched.grids.len());
+        let pairs: Vec<_> = levels.map(|l| self.pairs(a, b, l, settings)).collect();
+        // Exactly as much as is needed: there are millions of matches.
+        let mut found = Vec::with_capacity(pairs.iter().map(Vec::len).sum());
+        for (level, pairs) in pairs.iter().enumerate() {
+            let first = [a, b].map(|laid| laid.placed.level_starts[level]);
+            found.extend(pairs.iter().map(|&(i, j)| {
+                let (i, j) = (first[0] + i as usize, first[1] + j as usize);
+                LinkMatch::between(a, i, b, j, settings.range_sigma)
+            }));
         }
         found
     }

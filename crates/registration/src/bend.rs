@@ -146,20 +146,25 @@ mod tests {
     }
 
     proptest! {
+        /// Neighbours on all sides: those in one line would not tell across from along.
         #[test]
         fn a_trunk_bends_across_and_not_along(
             radius in 0.1..0.4_f64,
-            around in prop::collection::vec((-0.5..0.5_f64, -0.2..0.2_f64), 8),
+            around in prop::array::uniform8((0.2..0.5_f64, 0.05..0.2_f64)),
         ) {
             let surfel = on_trunk(radius, 0.0, 0.0);
-            let others: Vec<_> = around.iter().map(|&(a, z)| on_trunk(radius, a, z)).collect();
-            let seen: f64 = others.iter().map(|o| o.mean.y * o.mean.y).sum();
-            prop_assume!(seen > 0.01);
+            let sides = [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)].into_iter().cycle();
+            let others: Vec<_> = around
+                .iter()
+                .zip(sides)
+                .map(|((angle, height), (a, z))| on_trunk(radius, a * angle, z * height))
+                .collect();
             let bend = bend_at(&surfel, others.iter(), VOXEL).shape;
             // The prior takes a share that the extent of what was seen tells.
+            let seen: f64 = others.iter().map(|o| o.mean.y * o.mean.y).sum();
             let ridge = (NORMAL_SIGMA * VOXEL / EXPECTED).powi(2);
-            prop_assert!((bend[(1, 1)] * radius - 1.0).abs() < 0.02 + 3.0 * ridge / seen, "{bend}");
-            prop_assert!(bend[(2, 2)].abs() < 1.0 && bend[(0, 0)].abs() < 1e-12);
+            prop_assert!((bend[(1, 1)] * radius - 1.0).abs() < 0.05 + 3.0 * ridge / seen, "{bend}");
+            prop_assert!(bend[(2, 2)].abs() < 1.0 && bend[(0, 0)].abs() < 1e-12, "{bend}");
         }
 
         #[test]

@@ -6,12 +6,11 @@
     reason = "only what is inlined into a dispatched function uses the machine's instructions"
 )]
 
-use bentwing_neighbors::{Grid, Neighbors, Search, claimed_pairs, mutual_pairs};
+use bentwing_neighbors::{Grid, Search, claimed_pairs, mutual_pairs};
 use bentwing_trajectory::Head;
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
-use crate::bend::{self, Bend};
 use crate::constraints::surfel_match::{self, MatchPlane};
 use crate::fixed_view::FixedView;
 use crate::placed::{Placed, PlacedSurfel};
@@ -65,34 +64,27 @@ pub fn find(placed: &Placed, views: &[&FixedView], settings: &Settings) -> Vec<M
     let levels: Vec<usize> = (0..placed.voxel_sizes.len()).collect();
     let grid = |&l: &usize| grid_of(&placed.surfels[placed.level(l)], placed.voxel_sizes[l]);
     let grids: Vec<Grid> = levels.par_iter().map(grid).collect();
-    let in_window = levels
-        .par_iter()
-        .map(|&level| own_search(level, placed, &grids[level], settings));
-    let own: Vec<(Vec<Pair>, Vec<Bend>)> = in_window.collect();
-    let searches: Vec<_> = (0u32..)
+    let in_window = levels.iter().map(|&level| (level, None));
+    let in_views = (0u32..)
         .zip(views)
-        .flat_map(|(v, &view)| levels.iter().map(move |&level| (level, v, view)))
-        .collect();
-    let in_views = searches
+        .flat_map(|(v, &view)| levels.iter().map(move |&level| (level, Some((v, view)))));
+    let searches: Vec<_> = in_window.chain(in_views).collect();
+    let pairs: Vec<Vec<Pair>> = searches
         .par_iter()
-        .map(|&(level, v, view)| in_view(level, (v, view), placed, &grids[level], settings));
-    let in_views: Vec<Vec<Pair>> = in_views.collect();
-    let (mut pairs, bends): (Vec<_>, Vec<_>) = own.into_iter().unzip();
-    pairs.extend(in_views);
-    let (pairs, bends) = (pairs.concat(), bends.concat());
+        .map(|&(level, view)| find_on_level(level, view, placed, &grids[level], settings))
+        .collect();
     let plane = |&pair: &Pair| {
         let surfel = &placed.surfels[pair.0 as usize];
-        let own = &bends[pair.0 as usize];
-        let (other, its) = match pair.1 {
-            Target::Moving(j) => (&placed.surfels[j as usize], &bends[j as usize]),
-            Target::Fixed(v, j) => (&views[v as usize].surfels[j as usize], own),
+        let other = match pair.1 {
+            Target::Moving(j) => &placed.surfels[j as usize],
+            Target::Fixed(v, j) => &views[v as usize].surfels[j as usize],
         };
-        let bend = bend::between(own, its);
-        let plane = MatchPlane::new(surfel, other, &bend, settings.range_sigma);
+        let plane = MatchPlane::new(surfel, other, settings.range_sigma);
         let group = group(placed, pair);
         Match { pair, plane, group }
     };
     let mut matches = Vec::new();
+    let pairs = pairs.concat();
     let planes = pairs.par_iter().with_min_len(MIN_ROWS_PER_TASK).map(plane);
     planes.collect_into_vec(&mut matches);
     matches
@@ -107,50 +99,27 @@ pub fn search(settings: &Settings) -> Search {
     }
 }
 
-/// The neighbours of the surfels of one level among themselves: enough of them to tell how the
-/// surfaces bend, the first ones for matches.
-pub fn among_themselves(grid: &Grid, settings: &Settings) -> Neighbors {
-    let k = settings.n_neighbors.max(bend::N_NEIGHBORS);
-    grid.nearest(
-        grid,
-        &Search {
-            k,
-            ..search(settings)
-        },
-    )
-}
-
-/// Pairs of the surfels of one level, which are in `grid`, and how their surfaces bend.
-fn own_search(
+/// Pairs of the surfels of one level, which are in `grid`, among themselves or with a view.
+fn find_on_level(
     level: usize,
-    placed: &Placed,
-    grid: &Grid,
-    settings: &Settings,
-) -> (Vec<Pair>, Vec<Bend>) {
-    let nearest = among_themselves(grid, settings);
-    let first = placed.level_starts[level] as u32;
-    let pairs = mutual_pairs(&nearest, settings.n_neighbors)
-        .map(|(a, b)| (first + a, Target::Moving(first + b)));
-    let surfels = &placed.surfels[placed.level(level)];
-    (
-        pairs.collect(),
-        bend::bends(surfels, &nearest, placed.voxel_sizes[level]),
-    )
-}
-
-/// Pairs of the surfels of one level, which are in `grid`, with a view.
-fn in_view(
-    level: usize,
-    (v, view): (u32, &FixedView),
+    view: Option<(u32, &FixedView)>,
     placed: &Placed,
     grid: &Grid,
     settings: &Settings,
 ) -> Vec<Pair> {
+    let search = search(settings);
+    let first = placed.level_starts[level] as u32;
+    let Some((v, view)) = view else {
+        let nearest = grid.nearest(grid, &search);
+        let moving = mutual_pairs(&nearest, search.k);
+        return moving
+            .map(|(a, b)| (first + a, Target::Moving(first + b)))
+            .collect();
+    };
     let Some(fixed) = view.grids.get(level) else {
         return Vec::new();
     };
-    let nearest = fixed.nearest(grid, &search(settings));
-    let first = placed.level_starts[level] as u32;
+    let nearest = fixed.nearest(grid, &search);
     let first_fixed = view.level_starts[level] as u32;
     let claimed = claimed_pairs(&nearest, fixed.len()).into_iter();
     claimed
@@ -287,7 +256,7 @@ impl<'a> MatchRows<'a> {
         sum.globals_mut().fill(0.0);
         surfel_match::write_knots(&mut sum.knots_mut()[..24], surfel, n, 1.0);
         surfel_match::add_globals(sum.globals_mut(), self.head, surfel, n, 1.0);
-        let mut residual = n.dot(&surfel.mean) + row.plane.offset;
+        let mut residual = n.dot(&surfel.mean);
         match target {
             Target::Moving(j) => {
                 let other = &self.placed.surfels[j as usize];

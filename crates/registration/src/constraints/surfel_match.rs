@@ -10,7 +10,6 @@ use bentwing_surfels::sym3;
 use bentwing_trajectory::{Head, so3};
 use nalgebra::{Matrix3, Vector3};
 
-use crate::bend::depth;
 use crate::index;
 use crate::placed::PlacedSurfel;
 
@@ -22,8 +21,6 @@ pub struct MatchPlane {
     normal_imu: Vector3<f64>,
     /// `ξ² = 1 / (σ_r² + λ1 (1 + q))`, m⁻².
     pub information: f64,
-    /// What the surface's bend adds to `nᵀ (μ_i − μ_j)`, m.
-    pub offset: f64,
 }
 
 impl MatchPlane {
@@ -33,27 +30,15 @@ impl MatchPlane {
     /// error of the normal counts with the way between the means. In units of the patches' own
     /// extents that way is `q = dᵀ S⁻¹ d` in the plane; the plane extrapolated so far is uncertain by
     /// `λ1 q`. Without it narrow patches far apart are too certain of the sensor's yaw.
-    ///
-    /// `bend` is the shape operator of their surface, see the module of that name.
-    pub fn new(
-        surfel: &PlacedSurfel,
-        other: &PlacedSurfel,
-        bend: &Matrix3<f64>,
-        range_sigma: f64,
-    ) -> Self {
+    pub fn new(surfel: &PlacedSurfel, other: &PlacedSurfel, range_sigma: f64) -> Self {
         let covariance = surfel.covariance + other.covariance;
         let eigen = sym3::eigen(&covariance);
         let roughness = eigen.values[0].max(0.0);
         let q = distance_in_plane(&covariance, &eigen, &(surfel.mean - other.mean));
-        let normal = if eigen.normal.dot(&surfel.normal) < 0.0 {
-            -eigen.normal
-        } else {
-            eigen.normal
-        };
+        let side = eigen.normal.dot(&surfel.normal).signum();
         Self {
-            normal_imu: surfel.R_map_imu.tr_mul(&normal),
+            normal_imu: surfel.R_map_imu.tr_mul(&eigen.normal) * side,
             information: 1.0 / (range_sigma * range_sigma + roughness * (1.0 + q)),
-            offset: depth(bend, &surfel.covariance) - depth(bend, &other.covariance),
         }
     }
 

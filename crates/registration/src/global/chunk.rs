@@ -4,14 +4,14 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use bentwing_neighbors::{Grid, mutual_pairs};
+use bentwing_neighbors::{Grid, Search, mutual_pairs};
 use bentwing_surfels::SurfelSet;
 use rayon::prelude::*;
 
 use super::piece::PieceState;
 use crate::Settings;
-use crate::bend::{Bend, bends};
-use crate::matches::{among_themselves, grid_of};
+use crate::bend::{Bend, N_NEIGHBORS, bends};
+use crate::matches::{grid_of, search};
 use crate::placed::Placed;
 
 /// A stretch and where it belongs.
@@ -55,7 +55,14 @@ impl Searched {
         for (level, &size) in placed.voxel_sizes.iter().enumerate() {
             let surfels = &placed.surfels[placed.level(level)];
             let grid = grid_of(surfels, size);
-            let nearest = among_themselves(&grid, settings);
+            let k = settings.n_neighbors.max(N_NEIGHBORS);
+            let nearest = grid.nearest(
+                &grid,
+                &Search {
+                    k,
+                    ..search(settings)
+                },
+            );
             let pairs = mutual_pairs(&nearest, settings.n_neighbors).collect();
             found.own_pairs.push(pairs);
             found.bends.extend(bends(surfels, &nearest, size));

@@ -26,6 +26,8 @@ pub struct LinkMatch {
     i: u32,
     j: u32,
     plane: MatchPlane,
+    /// What the bend of their surface adds to `nᵀ (μ_i − μ_j)`, m.
+    offset: f64,
 }
 
 impl LinkMatch {
@@ -36,7 +38,8 @@ impl LinkMatch {
         Self {
             i: i as u32,
             j: j as u32,
-            plane: MatchPlane::new(surfel, other, &bend, range_sigma),
+            plane: MatchPlane::new(surfel, other, range_sigma),
+            offset: bend::depth(&bend, &surfel.covariance) - bend::depth(&bend, &other.covariance),
         }
     }
 
@@ -45,7 +48,7 @@ impl LinkMatch {
     pub fn plane_at(&self, a: &Laid) -> (nalgebra::Vector3<f64>, f64, f64) {
         let surfel = &a.placed.surfels[self.i as usize];
         let plane = &self.plane;
-        (plane.normal(surfel), plane.information, plane.offset)
+        (plane.normal(surfel), plane.information, self.offset)
     }
 }
 
@@ -235,7 +238,7 @@ impl LinkSum<'_> {
             stand_ins.fill(0.0);
             surfel_match::add_globals(&mut stand_ins[..N_GLOBALS], heads[1], other, n, -1.0);
         }
-        let residual = n.dot(&(surfel.mean - other.mean)) + m.plane.offset;
+        let residual = n.dot(&(surfel.mean - other.mean)) + m.offset;
         let x = residual * m.plane.information.sqrt();
         let w = cauchy_weight(x, self.scale);
         rows.add(residual, w * m.plane.information);

@@ -3,6 +3,7 @@
 #![forbid(unsafe_code)]
 
 mod blocks;
+mod calibration;
 mod cholesky;
 mod chordal;
 mod dogleg;

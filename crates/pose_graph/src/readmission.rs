@@ -8,12 +8,13 @@
 use nalgebra::{Isometry3, Matrix6};
 
 use crate::GraphError;
+use crate::calibration::calibrated;
 use crate::chordal::Relaxation;
 use crate::dogleg::{Minimizer, Minimum, Stop};
 use crate::equations::structure;
 use crate::graph::{PoseGraph, held};
 use crate::motion::{Motion, squared};
-use crate::robust::{Residuals, Robust, anneal};
+use crate::robust::{Residuals, Robust, anneal, narrow};
 use crate::solve::cheaper;
 use crate::terms::LinkAt;
 use crate::voting::supported;
@@ -81,23 +82,47 @@ impl Search<'_> {
     fn in_rounds(&mut self) -> Result<(), GraphError> {
         let mut open = first_opened(self.graph, self.robust);
         self.anneal_opening(&mut open)?;
-        self.minimize()?;
-        let lonely: Vec<usize> = (0..open.len()).filter(|&index| !open[index]).collect();
-        let credible = self.lonely_credible(&lonely)?;
-        if credible.is_empty() {
-            return self.revise(&open);
-        }
-        for index in credible {
-            open[index] = true;
-        }
-        self.among(&open)
+        self.calibrated(&mut open, |search, open| {
+            let lonely: Vec<usize> = (0..open.len()).filter(|&index| !open[index]).collect();
+            let credible = search.lonely_credible(&lonely)?;
+            if !credible.is_empty() {
+                for index in credible {
+                    open[index] = true;
+                }
+                search.anneal(open)?;
+                search.minimize()?;
+            }
+            search.revise(open)
+        })
+    }
+
+    /// Does `work` with turns and shifts weighed as their residuals tell, then finds the minimum for
+    /// the information as it was given.
+    fn calibrated(
+        &mut self,
+        open: &mut [bool],
+        work: impl FnOnce(&mut Search, &mut [bool]) -> Result<(), GraphError>,
+    ) -> Result<(), GraphError> {
+        let Some(graph) = calibrated(self.graph, &self.best.poses, &self.weights) else {
+            self.minimize()?;
+            return work(self, open);
+        };
+        let mut search = Search {
+            graph: &graph,
+            weights: self.weights.clone(),
+            best: self.best.clone(),
+            ..*self
+        };
+        search.settle(open)?;
+        work(&mut search, open)?;
+        (self.weights, self.best) = (search.weights, search.best);
+        self.descend(self.best.poses.clone())
     }
 
     /// Finds the true links among those that are `open`.
     fn among(&mut self, open: &[bool]) -> Result<(), GraphError> {
         self.anneal(open)?;
-        self.minimize()?;
-        self.revise(open)
+        self.calibrated(&mut open.to_vec(), |search, open| search.revise(open))
     }
 
     /// Does what the kernel leaves to do.
@@ -109,8 +134,7 @@ impl Search<'_> {
     /// Tells which of the `open` links are true, roughly.
     fn anneal(&mut self, open: &[bool]) -> Result<(), GraphError> {
         let (graph, numbers) = (self.graph, self.numbers);
-        let weights: Vec<f64> = open.iter().map(|&o| f64::from(u8::from(o))).collect();
-        let structure = structure(graph, numbers, &weights);
+        let structure = structure(graph, numbers, &as_weights(open));
         let mut relaxation = Relaxation::new(graph, numbers, &structure)?;
         let start = |given: &[Isometry3<f64>], weights: &[f64]| {
             cheaper(graph, given, relaxation.poses(weights)?, weights)
@@ -139,13 +163,49 @@ impl Search<'_> {
         self.anneal(open)
     }
 
+    /// Tells again which of the open links are true, from the poses found on, and finds the minimum.
+    fn settle(&mut self, open: &[bool]) -> Result<(), GraphError> {
+        let (graph, numbers) = (self.graph, self.numbers);
+        let structure = structure(graph, numbers, &as_weights(open));
+        let mut minimizer = Minimizer::new(graph, numbers, &structure)?;
+        let start = |given: &[Isometry3<f64>], _: &[f64]| Ok(given.to_vec());
+        // The kernel leaves folds from which no descent leads back.
+        let relaxed = Relaxation::new(graph, numbers, &structure)?.poses(&self.weights)?;
+        self.best.poses = cheaper(graph, &self.best.poses, relaxed, &self.weights)?;
+        let width = self.residuals().limit(self.robust);
+        let (found, weights) = narrow(
+            graph,
+            open,
+            self.best.clone(),
+            width,
+            &mut minimizer,
+            start,
+            self.robust,
+        )?;
+        self.best = found;
+        let minimum = minimizer.minimize(self.best.poses.clone(), &weights, self.stop)?;
+        self.weights = weights;
+        self.moved_to(minimum);
+        Ok(())
+    }
+
     /// Finds the minimum for the weights.
     fn minimize(&mut self) -> Result<(), GraphError> {
         let structure = structure(self.graph, self.numbers, &self.weights);
         let mut relaxation = Relaxation::new(self.graph, self.numbers, &structure)?;
         // The kernel leaves poses that are bent towards links that have no weight any more.
         let relaxed = relaxation.poses(&self.weights)?;
-        let start = cheaper(self.graph, &self.best.poses, relaxed, &self.weights)?;
+        self.descend(cheaper(
+            self.graph,
+            &self.best.poses,
+            relaxed,
+            &self.weights,
+        )?)
+    }
+
+    /// Finds the minimum that is nearest to `start`.
+    fn descend(&mut self, start: Vec<Isometry3<f64>>) -> Result<(), GraphError> {
+        let structure = structure(self.graph, self.numbers, &self.weights);
         let mut minimizer = Minimizer::new(self.graph, self.numbers, &structure)?;
         self.moved_to(minimizer.minimize(start, &self.weights, self.stop)?);
         Ok(())
@@ -232,6 +292,10 @@ impl Search<'_> {
             ..found
         };
     }
+}
+
+fn as_weights(open: &[bool]) -> Vec<f64> {
+    open.iter().map(|&o| f64::from(u8::from(o))).collect()
 }
 
 /// The limit, halved until not most of those within it are far out.

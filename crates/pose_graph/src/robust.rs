@@ -60,14 +60,30 @@ pub fn anneal(
     mut start: impl FnMut(&[Isometry3<f64>], &[f64]) -> Result<Vec<Isometry3<f64>>, GraphError>,
     robust: &Robust,
 ) -> Result<(Minimum, Vec<f64>), GraphError> {
+    let all: Vec<f64> = open.iter().map(|&o| f64::from(u8::from(o))).collect();
+    let first = minimizer.minimize(start(poses, &all)?, &all, ROUGHLY)?;
+    // Convex from here on (Yang 2020, remark 5).
+    let width = 2.0 * Residuals::at(graph, open, &first.poses).worst;
+    narrow(graph, open, first, width, minimizer, start, robust)
+}
+
+/// The same from poses that are nearly right, with a kernel that is no wider than `width`.
+///
+/// # Errors
+/// As the minimization.
+pub fn narrow(
+    graph: &PoseGraph,
+    open: &[bool],
+    mut best: Minimum,
+    mut width: f64,
+    minimizer: &mut Minimizer,
+    mut start: impl FnMut(&[Isometry3<f64>], &[f64]) -> Result<Vec<Isometry3<f64>>, GraphError>,
+    robust: &Robust,
+) -> Result<(Minimum, Vec<f64>), GraphError> {
     let mut step = |poses: &[Isometry3<f64>], weights: &[f64]| {
         minimizer.minimize(start(poses, weights)?, weights, ROUGHLY)
     };
-    let all: Vec<f64> = open.iter().map(|&o| f64::from(u8::from(o))).collect();
-    let mut best = step(poses, &all)?;
     let mut residuals = Residuals::at(graph, open, &best.poses);
-    // Convex from here on (Yang 2020, remark 5).
-    let mut width = 2.0 * residuals.worst;
     let mut n_final_steps = 0;
     while n_final_steps < MAX_FINAL_STEPS {
         let weights = residuals.weights(graph, open, |chi2| (width / (chi2 + width)).powi(2));

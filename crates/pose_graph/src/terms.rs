@@ -43,6 +43,16 @@ impl LinkAt {
         self.residual.dot(&(link.information * self.residual))
     }
 
+    /// `rᵀΩr` of the turn alone, and of the shift.
+    pub fn chi2_of_turn_and_shift(&self, link: &Link) -> (f64, f64) {
+        let part = |first: usize| {
+            let r = self.residual.fixed_rows::<3>(first);
+            let information = link.information.fixed_view::<3, 3>(first, first);
+            r.dot(&(information * r))
+        };
+        (part(0), part(3))
+    }
+
     /// The residual.
     pub fn residual(&self) -> &Vector6<f64> {
         &self.residual

@@ -8,7 +8,7 @@
 use nalgebra::Isometry3;
 
 use crate::graph::PoseGraph;
-use crate::robust::EXACT;
+use crate::robust::{EXACT, median};
 use crate::terms::LinkAt;
 
 /// Links at least that tell it.
@@ -38,7 +38,8 @@ pub fn calibrated(
     if turns.len() < MIN_LINKS {
         return None;
     }
-    let factor = (median(turns) / median(shifts)).clamp(1.0 / MAX_FACTOR, MAX_FACTOR);
+    let typical = |values: &[f64]| median(values).map(|m| m.max(EXACT));
+    let factor = (typical(&turns)? / typical(&shifts)?).clamp(1.0 / MAX_FACTOR, MAX_FACTOR);
     if (1.0 / MIN_FACTOR..MIN_FACTOR).contains(&factor) {
         return None;
     }
@@ -56,20 +57,13 @@ pub fn calibrated(
     Some(graph)
 }
 
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_unstable_by(f64::total_cmp);
-    values[values.len() / 2].max(EXACT)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::GraphError;
-    use crate::dogleg::Stop;
     use crate::poses::numbered;
     use crate::readmission::believed;
-    use crate::robust::Robust;
-    use crate::testing::{helix, noisy_helix, with_false_links};
+    use crate::testing::{FINELY, ROBUST, helix, noisy_helix, with_false_links};
 
     /// The graph with variances of turns that are `factor` times too small.
     fn too_sure_of_turns(mut graph: PoseGraph, factor: f64) -> PoseGraph {
@@ -114,19 +108,10 @@ mod tests {
 
     #[test]
     fn false_links_are_told_where_information_is_too_sure_of_turns() -> Result<(), GraphError> {
-        let robust = Robust {
-            kernel_width: 3.0,
-            max_ratio: 25.0,
-            growth: 2.0,
-        };
-        let stop = Stop {
-            max_iterations: 50,
-            min_relative_decrease: 1e-9,
-        };
         let wrong = too_sure_of_turns(noisy_helix(8, 20), 300.0);
         let n_true = wrong.links.len();
         let graph = with_false_links(wrong, 30);
-        let (_, weights) = believed(&graph, &numbered(&graph), stop, &robust)?;
+        let (_, weights) = believed(&graph, &numbered(&graph), FINELY, &ROBUST)?;
         assert!(weights[..n_true].iter().all(|&w| w == 1.0));
         assert!(weights[n_true..].iter().all(|&w| w == 0.0));
         Ok(())

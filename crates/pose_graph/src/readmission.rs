@@ -352,21 +352,13 @@ fn open_bridges(graph: &PoseGraph, open: &mut [bool]) {
 mod tests {
     use super::*;
     use crate::poses::numbered;
-    use crate::testing::{drifted, farthest, helix, noisy_helix, true_link, with_false_links};
+    use crate::testing::{
+        FINELY, ROBUST, drifted, farthest, helix, noisy_helix, true_link, with_false_links,
+    };
     use nalgebra::Vector3;
 
-    const ROBUST: Robust = Robust {
-        kernel_width: 3.0,
-        max_ratio: 25.0,
-        growth: 2.0,
-    };
-
     fn found(graph: &PoseGraph) -> Result<(Minimum, Vec<f64>), GraphError> {
-        let stop = Stop {
-            max_iterations: 50,
-            min_relative_decrease: 1e-9,
-        };
-        believed(graph, &numbered(graph), stop, &ROBUST)
+        believed(graph, &numbered(graph), FINELY, &ROBUST)
     }
 
     /// The last turn has only its way in time and, among many false links, one true one that nobody

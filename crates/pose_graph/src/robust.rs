@@ -108,6 +108,13 @@ pub fn narrow(
     Ok((best, weights))
 }
 
+/// The middle one of the values.
+pub fn median(values: &[f64]) -> Option<f64> {
+    let mut sorted = values.to_vec();
+    sorted.sort_unstable_by(f64::total_cmp);
+    sorted.get(sorted.len() / 2).copied()
+}
+
 /// `rᵀΩr` of all links, and of the doubtful ones that are open to belief the median and the largest.
 pub struct Residuals {
     /// Of all links.

@@ -111,15 +111,9 @@ fn named(error: GraphError, numbers: &[Option<usize>]) -> GraphError {
 mod tests {
     use super::*;
     use crate::graph::{GravityTerm, Link};
-    use crate::testing::{drifted, farthest, helix, noisy_helix, with_false_links};
+    use crate::testing::{ROBUST, drifted, farthest, helix, noisy_helix, with_false_links};
     use bentwing_trajectory::so3;
     use nalgebra::{Matrix6, Vector3, Vector6};
-
-    const ROBUST: Robust = Robust {
-        kernel_width: 3.0,
-        max_ratio: 25.0,
-        growth: 2.0,
-    };
 
     fn settings(robust: Option<Robust>) -> Settings {
         Settings {

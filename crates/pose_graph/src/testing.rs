@@ -7,8 +7,23 @@ use nalgebra::{Isometry3, Matrix6, SMatrix, SVector, Vector3, Vector6};
 use proptest::prelude::*;
 use proptest::test_runner::TestCaseError;
 
+use crate::dogleg::Stop;
 use crate::graph::{Link, PoseGraph};
 use crate::poses::correct;
+use crate::robust::Robust;
+
+/// How false links are told in tests.
+pub const ROBUST: Robust = Robust {
+    kernel_width: 3.0,
+    max_ratio: 25.0,
+    growth: 2.0,
+};
+
+/// How well minima are found in tests.
+pub const FINELY: Stop = Stop {
+    max_iterations: 50,
+    min_relative_decrease: 1e-9,
+};
 
 pub fn vector(max: f64) -> impl Strategy<Value = Vector3<f64>> {
     prop::array::uniform3(-max..max).prop_map(Vector3::from)

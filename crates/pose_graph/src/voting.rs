@@ -12,7 +12,7 @@
 
 use crate::graph::{Link, PoseGraph};
 use crate::motion::Motion;
-use crate::robust::EXACT;
+use crate::robust::{EXACT, median};
 
 /// Trusted links between the ends of companions at most, at each end.
 const REACH: usize = 2;
@@ -31,18 +31,11 @@ pub fn supported(graph: &PoseGraph, max_ratio: f64) -> Vec<bool> {
         .map(|index| neighborhood.differences(graph, index))
         .collect();
     // Companions by chance are few: of most links the middle one is true.
-    let mut middles: Vec<f64> = differences.iter().filter_map(|all| median(all)).collect();
-    middles.sort_unstable_by(f64::total_cmp);
+    let middles: Vec<f64> = differences.iter().filter_map(|all| median(all)).collect();
     let typical = median(&middles).map_or(EXACT, |m| m.max(EXACT));
     let vouched = |all: &Vec<f64>| all.iter().any(|d| *d <= max_ratio * typical);
     let links = graph.links.iter().zip(&differences);
     links.map(|(l, all)| l.trusted || vouched(all)).collect()
-}
-
-fn median(values: &[f64]) -> Option<f64> {
-    let mut sorted = values.to_vec();
-    sorted.sort_unstable_by(f64::total_cmp);
-    sorted.get(sorted.len() / 2).copied()
 }
 
 /// Nodes that few trusted links join, and the doubtful links at each node. The map counts as a node

@@ -35,7 +35,7 @@ class Budget:
     rate : most surfels per second
     n_surfels : most surfels
     n_unknowns : of the equations
-    megabytes : of memory, at most
+    megabytes : of memory for what is held; the process takes about a fifth more
     is_thinned : whether there would be more surfels if there were more memory
     """
 
@@ -68,7 +68,7 @@ class Budget:
         thinned = f", thinned to {self.rate:,.0f} a second" if self.is_thinned else ""
         return (
             f"{self.seconds:,.0f} s in one system of {self.n_unknowns:,} unknowns, at most "
-            f"{self.n_surfels:,} surfels{thinned}, at most {self.megabytes:,.0f} MB"
+            f"{self.n_surfels:,} surfels{thinned}, about {self.megabytes:,.0f} MB"
         )
 
 

@@ -87,11 +87,6 @@ test-python: $(CORE) ## the package's fast tests
 test-all: test-rust $(CORE) ## also the slow ones
 	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile -m "slow or not slow"
 
-.PHONY: golden
-golden: $(CORE) ## regenerate tests/golden; review the difference before you commit it
-	BENTWING_UPDATE_GOLDEN=1 $(BIN)/python -m pytest tests/golden
-	git --no-pager diff --stat -- tests/golden
-
 ##@ Look after the code
 
 .PHONY: fmt
@@ -119,6 +114,11 @@ check-python: $(CORE) $(if $(wildcard python/bentwing/_core.pyi),stubs) ## ruff,
 .PHONY: stubs
 stubs: $(CORE) ## compare the hand-written stubs with the compiled core
 	$(BIN)/python -m mypy.stubtest bentwing._core
+
+.PHONY: structure
+structure: setup ## who imports whom, and the pictures of it in the documentation
+	$(BIN)/python tests/support/structure.py
+	$(BIN)/python tests/support/structure.py --draw
 
 .PHONY: deny
 deny: ## licences, advisories and sources of the crates (needs cargo-deny)

@@ -12,12 +12,12 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from bentwing import geometry
+from bentwing.base import geometry
+from bentwing.base.progress import Progress
 from bentwing.calibrate import calibrate
 from bentwing.evaluate.nees import nees_bounds
-from bentwing.preprocess import RecordingPart
-from bentwing.progress import Progress
 from bentwing.recording import Payload, Recording
+from bentwing.recording.preprocess import RecordingPart
 from bentwing.simulate import Scenario, simulate
 
 REST, RAMP = 2.0, 0.35  # s until the motor is up to its rate, and beyond the revolution
@@ -61,7 +61,7 @@ def run(scenario: Scenario, folder: Path) -> dict:
 
 
 def _pose(transform):
-    from bentwing.estimators.mount import Pose
+    from bentwing.base.mount import Pose
 
     return Pose(np.array(transform.translation), np.array(transform.quaternion))
 

@@ -21,15 +21,16 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from bentwing import geometry
-from bentwing.estimators.interface import Calibration, Estimate
-from bentwing.estimators.mount import FixedMount, Pose
+from bentwing.base import geometry
+from bentwing.base.calibration import Calibration
+from bentwing.base.estimate import Estimate
+from bentwing.base.mount import FixedMount, Pose
+from bentwing.base.progress import Progress
+from bentwing.base.trajectory import Trajectory, read_tum
+from bentwing.closing.global_registration import Budget, GlobalSettings, close_loops
 from bentwing.evaluate.trajectory import absolute_error
-from bentwing.global_registration import Budget, GlobalSettings, close_loops
-from bentwing.preprocess import RecordingPart
-from bentwing.progress import Progress
 from bentwing.recording import Payload, Recording
-from bentwing.trajectory import Trajectory, read_tum
+from bentwing.recording.preprocess import RecordingPart
 
 DRIFT = np.array([0.03, -0.02, 0.01])  # m
 PERIOD = 170.0  # s

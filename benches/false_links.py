@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from bentwing import geometry
+from bentwing.base import geometry
+from bentwing.closing.pose_graph import Links, PoseGraph, SolveSettings, solve
 from bentwing.evaluate.alignment import align
-from bentwing.pose_graph import Links, PoseGraph, SolveSettings, solve
 
 
 def with_false_links(graph: PoseGraph, share: float, seed: int) -> tuple[PoseGraph, int]:

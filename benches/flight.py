@@ -13,8 +13,8 @@ from typing import get_args
 
 import numpy as np
 
-from bentwing.control import BumperSettings
-from bentwing.control.bumper import GRAVITY
+from bentwing.flight.control import BumperSettings
+from bentwing.flight.control.bumper import GRAVITY
 from bentwing.simulate.plant.drives import FREE_RATE, drives
 from bentwing.simulate.plant.flights import DESIRED, fly
 from bentwing.simulate.plant.outcomes import outcomes

@@ -19,7 +19,7 @@ import numpy as np
 import yaml
 from scoring import in_flight
 
-from bentwing import geometry
+from bentwing.base import geometry
 from bentwing.evaluate.nees import (
     levelled_covariances,
     nees,

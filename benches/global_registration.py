@@ -20,8 +20,8 @@ import numpy as np
 from cost import python
 from scoring import in_flight, score
 
+from bentwing.base.trajectory import read_tum
 from bentwing.evaluate.trajectory import absolute_error
-from bentwing.trajectory import read_tum
 
 COLUMNS = (
     "scene", "seed", "length", "ATE open", "ATE closed", "in flight open", "in flight closed",

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
 """Learn the transform of the places' descriptors from simulated flights, and write it.
 
-    python benches/learn_places.py [-o python/bentwing/places/metric.npz] [--seeds 1 2 …]
+    python benches/learn_places.py [-o python/bentwing/closing/places/metric.npz] [--seeds 1 2 …]
 
 Two flights in the same world are described at the same keypoints; those are matching pairs.
 Descriptors of other keypoints of all flights are the non-matching ones.
@@ -16,11 +16,11 @@ import numpy as np
 from place_clouds import FLIGHTS, kept_run
 from scipy.spatial import cKDTree
 
-from bentwing.places import cut_places, learn_metric
-from bentwing.places.cloud import voxel_means
-from bentwing.places.gestalt import describe, opposite
-from bentwing.places.keypoints import draw_keypoints, frames_at
-from bentwing.places.settings import PlaceSettings
+from bentwing.closing.places import cut_places, learn_metric
+from bentwing.closing.places.cloud import voxel_means
+from bentwing.closing.places.gestalt import describe, opposite
+from bentwing.closing.places.keypoints import draw_keypoints, frames_at
+from bentwing.closing.places.settings import PlaceSettings
 
 DIMENSIONS = 20
 SAME_POINT = 0.25

@@ -18,12 +18,12 @@ from pathlib import Path
 import numpy as np
 from scoring import in_flight, mapped_points, read_scene
 
-from bentwing import geometry
+from bentwing.base import geometry
+from bentwing.base.trajectory import read_tum
 from bentwing.evaluate.map import surface_error
 from bentwing.evaluate.trajectory import absolute_error
-from bentwing.pipeline import map_recording
+from bentwing.run.pipeline import map_recording
 from bentwing.simulate import Scenario, simulate
-from bentwing.trajectory import read_tum
 
 
 def main() -> None:

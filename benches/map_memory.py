@@ -17,15 +17,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing import geometry
-from bentwing.estimators.interface import Calibration
-from bentwing.estimators.mount import FixedMount, Pose
+from bentwing.base import geometry
+from bentwing.base.calibration import Calibration
+from bentwing.base.mount import FixedMount, Pose
+from bentwing.base.trajectory import Trajectory
 from bentwing.map.clean import clean
 from bentwing.map.project import project
 from bentwing.map.thin import thin
 from bentwing.map.writer import MAP_FORMATS, open_map
 from bentwing.recording.batches import LidarBatch
-from bentwing.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

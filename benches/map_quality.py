@@ -20,20 +20,20 @@ import numpy as np
 import yaml
 
 from bentwing import _core, map_recording
-from bentwing.geodesy import LevelFrame, ProjectedSystem
-from bentwing.georeference import GeoreferenceSettings
+from bentwing.base.geodesy import LevelFrame, ProjectedSystem
+from bentwing.base.progress import Progress
+from bentwing.base.run_record import read_record
+from bentwing.base.trajectory import read_tum
+from bentwing.closing.georeference import GeoreferenceSettings
 from bentwing.map.gps_time import adjusted_gps_origin
 from bentwing.map.project import project
 from bentwing.map.read_mesh import read_mesh
-from bentwing.preprocess import RecordingPart
-from bentwing.progress import Progress
 from bentwing.recording import Payload, Recording
-from bentwing.run_folder import read_record
+from bentwing.recording.preprocess import RecordingPart
 from bentwing.simulate import Scenario, simulate
 from bentwing.simulate.events import Person
 from bentwing.simulate.ros import EPOCH_NS
-from bentwing.simulate.scenario import prepare
-from bentwing.trajectory import read_tum
+from bentwing.simulate.simulation import prepare
 
 STILL, OFF = 0.03, 0.25  # m from the true surfaces: on them, and far from them
 GIRTH, SIZE = 0.5, 2.0  # m, around somebody who walks

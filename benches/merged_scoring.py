@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scoring import best_points, in_flight, read_scene, sampled
 
+from bentwing.base.trajectory import Trajectory, read_tum
 from bentwing.evaluate.alignment import align
 from bentwing.evaluate.map import surface_error
 from bentwing.evaluate.trajectory import absolute_error
 from bentwing.map.read import read_points
-from bentwing.trajectory import Trajectory, read_tum
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

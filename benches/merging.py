@@ -26,8 +26,8 @@ from knock import knocked
 from merged_scoring import merged_score
 from scoring import in_flight
 
+from bentwing.base.trajectory import read_tum
 from bentwing.evaluate.trajectory import absolute_error
-from bentwing.trajectory import read_tum
 
 COLUMNS = (
     "scene", "seed", "flights", "length of each", "points", "links", "rejected", "between by places",

@@ -17,21 +17,22 @@ from pathlib import Path
 import numpy as np
 import small_gicp
 
-from bentwing import _core, geometry
-from bentwing.estimators.buffer import BatchBuffer
-from bentwing.estimators.core_states import core_globals, core_samples
-from bentwing.estimators.ndt.keyframes import ROUGHNESS
-from bentwing.estimators.ndt.matching import (
+from bentwing import _core
+from bentwing.base import geometry
+from bentwing.base.trajectory import read_tum
+from bentwing.odometry.buffer import BatchBuffer
+from bentwing.odometry.core_states import core_globals, core_samples
+from bentwing.odometry.ndt.keyframes import ROUGHNESS
+from bentwing.odometry.ndt.matching import (
     INDEPENDENCE,
     ROTATION_SIGMA,
     SPACING,
     TRANSLATION_SIGMA,
 )
-from bentwing.preprocess import preprocess
 from bentwing.recording import Payload, Recording
+from bentwing.recording.preprocess import preprocess
 from bentwing.reproduce.trials import true_calibration
 from bentwing.simulate import Scenario, simulate
-from bentwing.trajectory import read_tum
 
 SCAN, FIRST, MAPPED = (
     0.1,

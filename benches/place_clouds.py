@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bentwing.base.trajectory import Trajectory
 from bentwing.simulate.ranging import nodes_around
-from bentwing.simulate.scenario import Scenario, prepare
-from bentwing.trajectory import Trajectory
+from bentwing.simulate.scenario import Scenario
+from bentwing.simulate.simulation import prepare
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bentwing.places.transform import apply, upright
+from bentwing.base.transform import apply, upright
 
 SETTINGS = ((0.5, 2), (0.25, 2), (0.1, 2), (0.05, 2))
 """Resolution of the density map, m, and voxels along a pixel's edge that keep one point each."""

@@ -32,17 +32,17 @@ from place_clouds import FLIGHTS, kept_run
 from place_peer import Peer
 from scipy.spatial import cKDTree
 
-from bentwing import geometry
-from bentwing.merging.matches import Match, Part, find_matches
-from bentwing.merging.placing import place_groups
-from bentwing.merging.survey import middle_of
-from bentwing.places import Place, PlaceSettings, cut_places, describe_parts
-from bentwing.places.transform import apply, inverse
+from bentwing.base import geometry
+from bentwing.base.transform import apply, inverse
+from bentwing.closing.joining.matches import Match, Part, find_matches
+from bentwing.closing.joining.placing import place_groups
+from bentwing.closing.joining.survey import middle_of
+from bentwing.closing.places import Place, PlaceSettings, cut_places, describe_parts
 
 if TYPE_CHECKING:
     from place_clouds import FlightKind
 
-    from bentwing.trajectory import Trajectory
+    from bentwing.base.trajectory import Trajectory
 
 RIGHT = 0.3
 OVERLAPPING = 0.4

@@ -37,8 +37,8 @@ from false_links import (
     with_known_truth,
 )
 
-from bentwing import geometry
-from bentwing.pose_graph import PoseGraph, Solution, SolveSettings, read_g2o, solve
+from bentwing.base import geometry
+from bentwing.closing.pose_graph import PoseGraph, Solution, SolveSettings, read_g2o, solve
 
 GRAPHS = (
     "smallGrid3D", "parking-garage", "sphere2500", "torus3D", "cubicle", "sphere_bignoise_vertex3",

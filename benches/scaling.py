@@ -21,10 +21,10 @@ from typing import TYPE_CHECKING
 
 from cost import python
 
-from bentwing import estimators
-from bentwing.estimators.settings import ContinuousSettings, SurfelSettings
-from bentwing.preprocess import preprocess
+from bentwing import odometry
+from bentwing.odometry.continuous.settings import ContinuousSettings, SurfelSettings
 from bentwing.recording import LidarBatch, Payload, Recording
+from bentwing.recording.preprocess import preprocess
 
 if TYPE_CHECKING:
     from bentwing.recording import Batch
@@ -71,7 +71,7 @@ def estimate(payload: Payload, batches: list[Batch], variant: Variant) -> dict[s
     """Seconds by stage, matches and surfels of a window on average."""
     surfels = SurfelSettings(max_rate=variant.max_rate)
     settings = ContinuousSettings(surfels=surfels)
-    engine = estimators.create("continuous", payload, settings, variant.threads)
+    engine = odometry.create("continuous", payload, settings, variant.threads)
     started = time.perf_counter()
     for batch in batches:
         engine.feed(batch)

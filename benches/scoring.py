@@ -12,16 +12,16 @@ import laspy
 import numpy as np
 import yaml
 
-from bentwing import geometry
 from bentwing._core import Scene
-from bentwing.errors import InputError
+from bentwing.base import geometry
+from bentwing.base.errors import InputError
+from bentwing.base.trajectory import Trajectory, read_tum
 from bentwing.evaluate.map import surface_error
 from bentwing.evaluate.trajectory import absolute_error, drift
 from bentwing.map.gps_time import adjusted_gps_origin
 from bentwing.map.read_mesh import read_mesh
-from bentwing.preprocess import preprocess
 from bentwing.recording import LidarBatch, Payload, Recording
-from bentwing.trajectory import Trajectory, read_tum
+from bentwing.recording.preprocess import preprocess
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -16,7 +16,8 @@ from scoring import read_scene
 
 from bentwing.evaluate.map import surface_error
 from bentwing.reproduce.campaign import Flown, fly
-from bentwing.reproduce.tazir2020 import FLIGHTS, measure
+from bentwing.reproduce.tazir2020 import FLIGHTS
+from bentwing.reproduce.tazir_measures import measure
 
 COLUMNS = (
     "flight", "seed", "estimator", "way, m", "RTE, mean (max), m", "RRE, mean, °", "ATE, m",

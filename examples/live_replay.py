@@ -19,14 +19,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import bentwing
-from bentwing.estimators.settings import ContinuousSettings
+from bentwing.base.trajectory import Trajectory, read_tum
 from bentwing.evaluate.trajectory import absolute_error
-from bentwing.trajectory import Trajectory, read_tum
+from bentwing.odometry.continuous.settings import ContinuousSettings
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from bentwing.live import StampedPose
+    from bentwing.flight.live import StampedPose
     from bentwing.recording import Batch
 
 POSE_RATE_HZ = 200.0

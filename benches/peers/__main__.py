@@ -25,9 +25,9 @@ from benches.peers.engines import ENGINES
 from benches.peers.prepare import prepare
 from benches.peers.runner import Source, run, short
 
-from bentwing.errors import BentwingError
+from bentwing.base.errors import BentwingError
+from bentwing.base.trajectory import read_tum
 from bentwing.recording import Payload, Recording
-from bentwing.trajectory import read_tum
 
 RESULTS = Path(__file__).parent / "results" / "peers.json"
 

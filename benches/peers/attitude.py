@@ -5,9 +5,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from bentwing import geometry
-from bentwing.preprocess.static_init import find_static_start
-from bentwing.trajectory import Trajectory
+from bentwing.base import geometry
+from bentwing.base.trajectory import Trajectory
+from bentwing.recording.preprocess.static_init import find_static_start
 
 
 def rest_bias(times: np.ndarray, gyro: np.ndarray, accel: np.ndarray) -> np.ndarray:

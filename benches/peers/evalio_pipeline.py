@@ -9,16 +9,17 @@ import numpy as np
 from evalio.pipelines import Pipeline
 from evalio.types import SE3, SO3, Stamp
 
-from bentwing import estimators, geometry
-from bentwing.errors import NotEnoughDataError
-from bentwing.estimators.settings import ContinuousSettings
+from bentwing import odometry
+from bentwing.base import geometry
+from bentwing.base.errors import NotEnoughDataError
+from bentwing.base.provenance import bentwing_version
+from bentwing.odometry.continuous.settings import ContinuousSettings
 from bentwing.recording import ImuBatch, LidarBatch, Payload
-from bentwing.run_record import bentwing_version
 
 if TYPE_CHECKING:
     from evalio.types import ImuMeasurement, ImuParams, LidarMeasurement, LidarParams
 
-    from bentwing.trajectory import Trajectory
+    from bentwing.base.trajectory import Trajectory
 
 Pose = tuple[np.ndarray, np.ndarray]
 
@@ -35,7 +36,7 @@ class Bentwing(Pipeline):
         self._threads = 1
         self._described: dict[str, dict] = {"lidar": {}, "imu": {}, "T_imu_lidar": {}}
         self._settings = ContinuousSettings()
-        self._estimator: estimators.Estimator | None = None
+        self._estimator: odometry.Estimator | None = None
         self._origin_ns: int | None = None
         self._last = -np.inf
         self._asked = -np.inf
@@ -96,7 +97,7 @@ class Bentwing(Pipeline):
     def initialize(self) -> None:
         """Make the estimator."""
         payload = Payload.model_validate(self._described)
-        self._estimator = estimators.create("continuous", payload, self._settings, self._threads)
+        self._estimator = odometry.create("continuous", payload, self._settings, self._threads)
 
     def add_imu(self, mm: ImuMeasurement) -> None:
         """Take a sample."""

@@ -12,7 +12,7 @@ from benches.peers import attitude, scans
 from benches.peers.feed import Feed, Head, Imu, write_feed
 from benches.peers.samples import Samples, read
 
-from bentwing import geometry
+from bentwing.base import geometry
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -11,8 +11,8 @@ import numpy as np
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
-from bentwing.preprocess import preprocess
 from bentwing.recording import ImuBatch, LidarBatch, Payload, Recording
+from bentwing.recording.preprocess import preprocess
 
 if TYPE_CHECKING:
     from pathlib import Path

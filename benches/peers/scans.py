@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bentwing import geometry
+from bentwing.base import geometry
 
 JOINED = 0.5
 """s; sweeps of a motor-turned lidar in one scan. Single ones see too little for a scan matcher."""

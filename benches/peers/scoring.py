@@ -12,12 +12,12 @@ from benches import scoring
 from benches.peers import attitude, scans
 from benches.peers.stamps import best_shift, on_truth, pose_stamps
 
-from bentwing import geometry
+from bentwing.base import geometry
+from bentwing.base.trajectory import Trajectory, read_tum
 from bentwing.evaluate.map import surface_error
 from bentwing.evaluate.trajectory import absolute_error, drift
-from bentwing.preprocess import preprocess
 from bentwing.recording import LidarBatch, Payload, Recording
-from bentwing.trajectory import Trajectory, read_tum
+from bentwing.recording.preprocess import preprocess
 
 if TYPE_CHECKING:
     from collections.abc import Callable

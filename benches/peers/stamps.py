@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bentwing.base.trajectory import Trajectory
 from bentwing.evaluate.trajectory import absolute_error
-from bentwing.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from benches.peers.engines import Engine

@@ -14,12 +14,12 @@ from benches.peers.prepare import prepare
 from benches.peers.runner import Source, run, short
 from benches.peers.scoring import peer_trajectory
 
-from bentwing import geometry
-from bentwing.errors import BentwingError
+from bentwing.base import geometry
+from bentwing.base.errors import BentwingError
+from bentwing.base.trajectory import Trajectory, read_tum
 from bentwing.evaluate.map import wall_thickness
-from bentwing.preprocess import preprocess
 from bentwing.recording import LidarBatch, Payload, Recording
-from bentwing.trajectory import Trajectory, read_tum
+from bentwing.recording.preprocess import preprocess
 
 if TYPE_CHECKING:
     import argparse

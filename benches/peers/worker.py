@@ -12,7 +12,7 @@ import numpy as np
 from benches.peers.engines import ENGINES
 from benches.peers.feed import open_feed
 
-from bentwing import geometry
+from bentwing.base import geometry
 
 
 def main() -> None:

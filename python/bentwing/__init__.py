@@ -7,7 +7,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from bentwing.errors import (
+    from bentwing.base.errors import (
         BentwingError,
         DivergedError,
         EstimationError,
@@ -18,13 +18,13 @@ if TYPE_CHECKING:
         SingularSystemError,
         UsageError,
     )
-    from bentwing.live import Odometry
-    from bentwing.merging import Merged, merge
-    from bentwing.pipeline import map_recording
+    from bentwing.base.trajectory import Trajectory
+    from bentwing.flight.live import Odometry
+    from bentwing.odometry.window import WindowResult, register_window
     from bentwing.recording import Payload, Recording
-    from bentwing.registration import WindowResult, register_window
-    from bentwing.run import Run
-    from bentwing.trajectory import Trajectory
+    from bentwing.run.merging import Merged, merge
+    from bentwing.run.pipeline import map_recording
+    from bentwing.run.run import Run
 
     __version__: str
 
@@ -53,26 +53,26 @@ __all__ = [
 
 # Where the names live; imported when first asked for, so that `import bentwing` costs nothing.
 _HOMES = {
-    "Odometry": "live",
-    "Merged": "merging",
-    "merge": "merging",
-    "map_recording": "pipeline",
+    "Odometry": "flight.live",
+    "Merged": "run.merging",
+    "merge": "run.merging",
+    "map_recording": "run.pipeline",
     "Payload": "recording",
     "Recording": "recording",
-    "WindowResult": "registration",
-    "register_window": "registration",
-    "Run": "run",
-    "Trajectory": "trajectory",
+    "WindowResult": "odometry.window",
+    "register_window": "odometry.window",
+    "Run": "run.run",
+    "Trajectory": "base.trajectory",
 }
 
 
 def __getattr__(name: str) -> object:
     if name == "__version__":
-        return import_module("bentwing.run_record").bentwing_version()
+        return import_module("bentwing.base.run_record").bentwing_version()
     if name not in __all__:
         msg = f"module {__name__!r} has no attribute {name!r}"
         raise AttributeError(msg)
-    return getattr(import_module(f"bentwing.{_HOMES.get(name, 'errors')}"), name)
+    return getattr(import_module(f"bentwing.{_HOMES.get(name, 'base.errors')}"), name)
 
 
 def __dir__() -> list[str]:

@@ -14,12 +14,12 @@ from typing import TypeAlias, final
 import numpy as np
 from numpy.typing import NDArray
 
-from bentwing.estimators.core_settings import CoreSettings
-from bentwing.estimators.kalman.core import FilterSettings, FilterState
-from bentwing.estimators.settings import SurfelSettings
-from bentwing.global_registration.matching import MatchingPlan
-from bentwing.pose_graph.graph import GravityTerms, Links
-from bentwing.pose_graph.solve import SolveSettings
+from bentwing.closing.global_registration.matching import MatchingPlan
+from bentwing.closing.pose_graph.graph import GravityTerms, Links
+from bentwing.closing.pose_graph.solve import SolveSettings
+from bentwing.odometry.continuous.core_settings import CoreSettings
+from bentwing.odometry.continuous.settings import SurfelSettings
+from bentwing.odometry.kalman.core import FilterSettings, FilterState
 
 __all__ = [
     "FixedView",

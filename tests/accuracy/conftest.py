@@ -12,7 +12,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from bentwing.pipeline import map_recording
+from bentwing.run.pipeline import map_recording
 
 # The same numbers as in the benches.
 sys.path.append(str(Path(__file__).resolve().parents[2] / "benches"))

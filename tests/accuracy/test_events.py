@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from bentwing.base.trajectory import Trajectory, read_tum
 from bentwing.evaluate.trajectory import absolute_error
-from bentwing.trajectory import Trajectory, read_tum
 
 SCENE, DURATION = "office", 22.0
 GAP = (0.6 * DURATION, 0.6 * DURATION + 1.5)  # s

@@ -18,8 +18,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from bentwing.base.trajectory import read_tum
 from bentwing.evaluate.trajectory import absolute_error
-from bentwing.trajectory import read_tum
 
 RANGE_SIGMA = 0.01  # m
 FLIGHTS = [("courtyard", 30.0), ("office", 30.0)]

@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from bentwing import _core, map_recording
-from bentwing.geodesy import LevelFrame, ProjectedSystem
+from bentwing.base.geodesy import LevelFrame, ProjectedSystem
 from bentwing.map.read_mesh import read_mesh
 from bentwing.simulate import Scenario, simulate
 

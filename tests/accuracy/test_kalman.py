@@ -10,12 +10,12 @@ from collections import Counter
 
 import pytest
 
-from bentwing import estimators
+from bentwing import odometry
+from bentwing.base.trajectory import read_tum
 from bentwing.evaluate.trajectory import absolute_error
-from bentwing.preprocess import preprocess
 from bentwing.recording import Payload, Recording
+from bentwing.recording.preprocess import preprocess
 from bentwing.simulate import Scenario, simulate
-from bentwing.trajectory import read_tum
 
 pytestmark = pytest.mark.slow
 
@@ -33,7 +33,7 @@ def test_a_flight_is_followed_within_millimetres(made_once, scene, head, seed, r
     scenario = Scenario(scene=scene, head=head, motor_rate=6.2832, duration=26.0, seed=seed)
     folder = made_once(f"kalman-{scene}-{head}-{seed}", lambda out: simulate(scenario, out))
     payload = Payload.load(folder / "payload.yaml")
-    engine = estimators.create("kalman", payload, None, 1)
+    engine = odometry.create("kalman", payload, None, 1)
     with Recording(folder / "recording.bag", payload) as recording:
         truth, _ = read_tum(folder / "truth_trajectory.txt", recording.clock.start_ns)
         for batch in preprocess(recording.batches(), payload, Counter()):

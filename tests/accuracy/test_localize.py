@@ -7,9 +7,9 @@ import json
 
 import pytest
 
-from bentwing.errors import EstimationError
+from bentwing.base.errors import EstimationError
 from bentwing.map.read import read_points
-from bentwing.pipeline import map_recording
+from bentwing.run.pipeline import map_recording
 
 PAYLOAD, RECORDING = "payload.yaml", "recording.bag"
 

@@ -12,7 +12,7 @@ import pytest
 pytestmark = pytest.mark.slow
 
 MAP = (
-    "import sys; from bentwing.pipeline import map_recording; "
+    "import sys; from bentwing.run.pipeline import map_recording; "
     "map_recording(sys.argv[1], sys.argv[2], sys.argv[3], map_spacing=1.0)"
 )
 

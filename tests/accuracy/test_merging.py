@@ -10,13 +10,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bentwing.errors import InputError, UsageError
+from bentwing.base.errors import InputError, UsageError
+from bentwing.base.trajectory import read_tum
 from bentwing.evaluate.trajectory import absolute_error
-from bentwing.flights import map_flights
-from bentwing.merging import merge
-from bentwing.pipeline import map_recording
+from bentwing.run.flights import map_flights
+from bentwing.run.merging import merge
+from bentwing.run.pipeline import map_recording
 from bentwing.simulate import Scenario, simulate
-from bentwing.trajectory import read_tum
 
 SECONDS = 22.0
 STALL = (0.55 * 30.0, 0.55 * 30.0 + 6.0)  # s

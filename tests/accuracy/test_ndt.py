@@ -13,12 +13,12 @@ import json
 import numpy as np
 import pytest
 
-from bentwing import geometry
+from bentwing.base import geometry
+from bentwing.base.trajectory import read_tum
 from bentwing.evaluate.poses import pose_errors
 from bentwing.evaluate.trajectory import absolute_error
-from bentwing.pipeline import map_recording
+from bentwing.run.pipeline import map_recording
 from bentwing.simulate import Scenario, simulate
-from bentwing.trajectory import read_tum
 
 pytestmark = pytest.mark.slow
 

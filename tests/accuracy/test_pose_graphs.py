@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from false_links import noisy_sphere_positions, position_error, with_false_links
 
-from bentwing.pose_graph import SolveSettings, read_g2o, solve
+from bentwing.closing.pose_graph import SolveSettings, read_g2o, solve
 
 COSTS = {
     "smallGrid3D": 517.92534,

@@ -8,11 +8,11 @@ import json
 import numpy as np
 import pytest
 
-from bentwing import geometry
+from bentwing.base import geometry
+from bentwing.base.trajectory import read_tum
 from bentwing.evaluate.map import wall_thickness
 from bentwing.map.read import read_points
-from bentwing.pipeline import map_recording
-from bentwing.trajectory import read_tum
+from bentwing.run.pipeline import map_recording
 
 pytestmark = pytest.mark.slow
 

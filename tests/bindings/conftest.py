@@ -9,9 +9,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bentwing import _core, geometry
-from bentwing.estimators.core_settings import CoreSettings
-from bentwing.estimators.settings import RegistrationSettings, SurfelSettings
+from bentwing import _core
+from bentwing.base import geometry
+from bentwing.odometry.continuous.core_settings import CoreSettings
+from bentwing.odometry.continuous.settings import RegistrationSettings, SurfelSettings
 from bentwing.recording import Payload
 
 DT, RATE_HZ, SPIN = 0.01, 200.0, 5.0  # s, Hz, rad/s

@@ -6,8 +6,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bentwing import geometry
-from bentwing.estimators.final_poses import FinalPoses
+from bentwing.base import geometry
+from bentwing.odometry.continuous.final_poses import FinalPoses
 
 
 def test_poses_follow_to_where_a_window_with_the_other_calibration_puts_them(register):

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from bentwing import _core
-from bentwing.estimators.settings import RegistrationSettings
+from bentwing.odometry.continuous.settings import RegistrationSettings
 
 UNIT = (0.0, 0.0, 0.0, 1.0)
 HERE = ((0.0, 0.0, 0.0), UNIT)

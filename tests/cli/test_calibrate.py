@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import yaml
 
-from bentwing import geometry
+from bentwing.base import geometry
 from bentwing.recording import Payload
 from bentwing.simulate import Scenario, simulate
 

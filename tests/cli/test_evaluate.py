@@ -11,12 +11,12 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 
-from bentwing import geometry
+from bentwing.base import geometry
+from bentwing.base.trajectory import Trajectory, read_tum
 from bentwing.evaluate.alignment import Alignment
 from bentwing.map.chunk import MapChunk
 from bentwing.map.read import read_points
 from bentwing.map.writer import open_map
-from bentwing.trajectory import Trajectory, read_tum
 
 ORIGIN = 1_700_000_000_000_000_000
 TRAJECTORY_FIGURES = {

@@ -9,8 +9,8 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+from bentwing.base.errors import PayloadError, RecordingError
 from bentwing.cli.info import info
-from bentwing.errors import PayloadError, RecordingError
 
 
 def run(*arguments):

@@ -9,13 +9,13 @@ import time
 
 import pytest
 
-from bentwing.trajectory import read_tum
+from bentwing.base.trajectory import read_tum
 
 # What `bentwing` does, telling when a window has been registered.
 SCRIPT = """
 import signal, sys
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a background job ignores it
-from bentwing.estimators.odometry_pass import OdometryPass
+from bentwing.odometry.continuous.odometry_pass import OdometryPass
 step = OdometryPass.step
 def told(self, *arguments):
     step(self, *arguments)

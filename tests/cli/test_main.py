@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from bentwing import pipeline, run_settings
+from bentwing.base.errors import BentwingError, EstimationError, RecordingError, UsageError
 from bentwing.cli.commands import COMMANDS
 from bentwing.cli.main import run_command
-from bentwing.errors import BentwingError, EstimationError, RecordingError, UsageError
-from bentwing.georeference import GeoreferenceSettings
+from bentwing.closing.georeference import GeoreferenceSettings
 from bentwing.map.clean import CleanSettings
+from bentwing.run import pipeline, settings
 
 BENTWING = "from bentwing.cli.main import run; run()"
 
@@ -49,7 +49,7 @@ def test_help_loads_nothing_heavy():
     script = (
         "import sys; from bentwing.cli.main import run_command; run_command(['--help']); "
         "print([m for m in ('numpy', 'laspy', 'rosbags', 'pydantic', 'matplotlib', "
-        "'bentwing.pipeline') if m in sys.modules])"
+        "'bentwing.run.pipeline') if m in sys.modules])"
     )
     done = subprocess.run(
         [sys.executable, "-c", script], capture_output=True, text=True, check=True
@@ -123,7 +123,7 @@ def test_options_reach_the_pipeline(called, capsys, monkeypatch):
 
 
 def test_settings_are_shown_without_a_recording(called, capsys, monkeypatch):
-    monkeypatch.setattr(run_settings, "settings_text", lambda *asked: f"{asked}")
+    monkeypatch.setattr(settings, "settings_text", lambda *asked: f"{asked}")
     assert run_command(["map", "--print-settings", "--payload", "head.yaml"]) == 0
     assert "('continuous', PosixPath('head.yaml'))" in capsys.readouterr().out
     assert called == []
@@ -174,7 +174,7 @@ def test_an_interrupt_ends_a_running_command_within_a_second(tmp_path):
     script = f"""
 import signal, time
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a background job ignores it
-from bentwing import pipeline
+from bentwing.run import pipeline
 def busy(*_, **__):
     print("busy", flush=True)
     time.sleep(60)

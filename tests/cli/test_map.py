@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from rosbags.rosbag1 import Writer
 
+from bentwing.base.trajectory import read_tum
 from bentwing.map.read import read_points
-from bentwing.trajectory import read_tum
 
 BENTWING = "from bentwing.cli.main import run; run()"
 SHORT = ("--duration", "9", "--map-spacing", "0.05")

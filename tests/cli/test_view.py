@@ -3,8 +3,8 @@ import json
 
 import pytest
 
-from bentwing.view.contents import read_contents
-from bentwing.view.show import log_contents
+from bentwing.report.view.contents import read_contents
+from bentwing.report.view.show import log_contents
 
 pytest.importorskip("rerun", reason="rerun-sdk is not installed")
 

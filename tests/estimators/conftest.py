@@ -13,12 +13,12 @@ from types import SimpleNamespace
 
 import pytest
 
-from bentwing import estimators
-from bentwing.estimators.kalman import KalmanSettings
-from bentwing.estimators.ndt import NdtSettings
-from bentwing.estimators.settings import ContinuousSettings
-from bentwing.preprocess import preprocess
+from bentwing import odometry
+from bentwing.odometry.continuous.settings import ContinuousSettings
+from bentwing.odometry.kalman import KalmanSettings
+from bentwing.odometry.ndt import NdtSettings
 from bentwing.recording import LidarBatch, Payload, Recording
+from bentwing.recording.preprocess import preprocess
 
 LENGTH = 11.0  # s; the rest at the start is over after four
 THINNING = 3  # every third point, for speed
@@ -72,7 +72,7 @@ def run(heads):
 
     def feed(name, *, batches=None, threads=1, settings=None):
         head = heads(name)
-        engine = estimators.create(name, head.payload, settings or QUICK[name], threads)
+        engine = odometry.create(name, head.payload, settings or QUICK[name], threads)
         for batch in head.batches if batches is None else batches:
             engine.feed(batch)
         return engine.result()

@@ -9,13 +9,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bentwing import estimators, geometry
-from bentwing.estimators.start import levelling
+from bentwing import odometry
+from bentwing.base import geometry
+from bentwing.base.trajectory import read_tum
 from bentwing.evaluate.trajectory import absolute_error
-from bentwing.live.prediction import Prediction
-from bentwing.preprocess import preprocess
+from bentwing.flight.live.prediction import Prediction
+from bentwing.odometry.start import levelling
 from bentwing.recording import ImuBatch, LidarBatch, Payload, Recording
-from bentwing.trajectory import read_tum
+from bentwing.recording.preprocess import preprocess
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +35,7 @@ def mapped(flight):
     """The estimate of the flight without what some sensors saw from `start` to `stop` s."""
 
     def estimate(start, stop, *silent):
-        engine = estimators.create("continuous", flight.payload, None, 2)
+        engine = odometry.create("continuous", flight.payload, None, 2)
         flight.engine = engine
         for batch in flight.batches:
             if isinstance(batch, silent):

@@ -9,7 +9,11 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from bentwing.estimators.settings import ContinuousSettings, RegistrationSettings, SurfelSettings
+from bentwing.odometry.continuous.settings import (
+    ContinuousSettings,
+    RegistrationSettings,
+    SurfelSettings,
+)
 
 QUICK = {"window": 3.0, "registration": {"max_outer": 2}}
 MODELS = [ContinuousSettings, RegistrationSettings, SurfelSettings]

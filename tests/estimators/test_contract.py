@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bentwing import estimators
-from bentwing.errors import EstimationError, NotEnoughDataError, PayloadError, UsageError
+from bentwing import odometry
+from bentwing.base.errors import EstimationError, NotEnoughDataError, PayloadError, UsageError
 from bentwing.recording import ImuBatch, LidarBatch
 
 
@@ -62,7 +62,7 @@ def poisoned(batches, kind, field, *, at, value=np.nan):
 
 def test_an_unknown_estimator_is_a_wrong_use(head):
     with pytest.raises(UsageError, match="'slam' is not known; choose continuous"):
-        estimators.create("slam", head.payload)
+        odometry.create("slam", head.payload)
 
 
 def test_the_trajectory_has_100_poses_a_second_over_the_recording(plain_run, head, name):
@@ -101,7 +101,7 @@ def test_standard_deviations_are_positive_and_smaller_than_before(plain_run, nam
 
 
 def test_the_result_is_the_same_when_asked_again(head, name):
-    engine = estimators.create(name, head.payload, None, 1)
+    engine = odometry.create(name, head.payload, None, 1)
     for batch in head.batches:
         if batch.times[0] < 6.5:
             engine.feed(batch)
@@ -137,7 +137,7 @@ def test_empty_batches_change_nothing(plain_run, run, head, name):
 
 
 def test_two_estimators_at_once_do_not_disturb_each_other(plain_run, quick, head, name):
-    engines = [estimators.create(name, head.payload, quick[name], 1) for _ in range(2)]
+    engines = [odometry.create(name, head.payload, quick[name], 1) for _ in range(2)]
     for batch in head.batches:
         for engine in engines:
             engine.feed(batch)
@@ -147,7 +147,7 @@ def test_two_estimators_at_once_do_not_disturb_each_other(plain_run, quick, head
 
 def test_without_data_there_is_no_result(head, name):
     with pytest.raises(NotEnoughDataError, match="lidar"):
-        estimators.create(name, head.payload).result()
+        odometry.create(name, head.payload).result()
 
 
 def test_inertial_data_alone_is_not_enough(run, head, name):
@@ -192,9 +192,9 @@ def test_without_an_imu_in_the_payload_the_lidar_stands_for_it(head, name):
     payload = head.payload.model_copy(update={"imu": None, "T_imu_lidar": None})
     if name == "kalman":
         with pytest.raises(PayloadError, match="predicts by an IMU and there is none"):
-            estimators.create(name, payload, None, 1)
+            odometry.create(name, payload, None, 1)
         return
-    engine = estimators.create(name, payload, None, 1)
+    engine = odometry.create(name, payload, None, 1)
     for batch in of_kind(head.batches, LidarBatch):
         if batch.times[0] < 4.0:
             engine.feed(batch)

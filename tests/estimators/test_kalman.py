@@ -14,27 +14,28 @@ import numpy as np
 import pytest
 import yaml
 
-from bentwing import estimators, geometry
-from bentwing.errors import (
+from bentwing import odometry
+from bentwing.base import geometry
+from bentwing.base.errors import (
     EstimationError,
     NotEnoughDataError,
     PayloadError,
     RecordingError,
 )
-from bentwing.estimators.kalman import KalmanSettings
-from bentwing.estimators.kalman.core import (
+from bentwing.base.trajectory import read_tum
+from bentwing.evaluate.trajectory import absolute_error
+from bentwing.odometry.kalman import KalmanSettings
+from bentwing.odometry.kalman.core import (
     BASE_ROTATION,
     ENCODER_DELAY,
     first_state,
     unlearned_delay,
 )
-from bentwing.estimators.kalman.filter_pass import Rest
-from bentwing.estimators.start import find_start
-from bentwing.evaluate.trajectory import absolute_error
-from bentwing.preprocess import preprocess
+from bentwing.odometry.kalman.filter_pass import Rest
+from bentwing.odometry.start import find_start
 from bentwing.recording import ImuBatch, LidarBatch, Payload, Recording
+from bentwing.recording.preprocess import preprocess
 from bentwing.simulate import Scenario, simulate
-from bentwing.trajectory import read_tum
 
 LENGTH = 22.0
 IMU_AT_REST = ImuBatch(
@@ -47,7 +48,7 @@ def fed(folder, *, until=LENGTH, change=lambda b: b, settings=None):
     payload = Payload.load(folder / "payload.yaml")
     with Recording(folder / "recording.bag", payload) as recording:
         truth, _ = read_tum(folder / "truth_trajectory.txt", recording.clock.start_ns)
-        engine = estimators.create("kalman", payload, settings, 1)
+        engine = odometry.create("kalman", payload, settings, 1)
         for batch in preprocess(recording.batches(0.0, until), payload, Counter()):
             changed = change(batch)
             if changed is not None:
@@ -184,7 +185,7 @@ def test_without_inertial_samples_it_is_refused_in_a_sentence(turning):
 
 
 def test_a_recording_without_imu_is_refused(shared_data):
-    engine = estimators.create("kalman", Payload.default())
+    engine = odometry.create("kalman", Payload.default())
     with Recording(shared_data / "garage_hdl32.bag", Payload.default()) as recording:
         batches = list(recording.batches(0.0, 4.0))
     with pytest.raises(RecordingError, match="predicts by an IMU"):
@@ -194,13 +195,13 @@ def test_a_recording_without_imu_is_refused(shared_data):
 def test_a_2d_lidar_is_refused_by_its_kind():
     payload = Payload.model_validate({"lidar": {"kind": "hokuyo-utm30lx"}})
     with pytest.raises(PayloadError, match=r"single planes.*--estimator continuous"):
-        estimators.create("kalman", payload)
+        odometry.create("kalman", payload)
 
 
 def test_a_2d_lidar_of_unknown_kind_is_refused_by_its_points():
     angles = np.linspace(0.0, 6.0, 8000)
     points = np.stack([5 * np.cos(angles), 4 * np.sin(angles), 0 * angles], axis=1)
-    engine = estimators.create("kalman", Payload.default())
+    engine = odometry.create("kalman", Payload.default())
     times = np.arange(400) / 200.0
     engine.feed(ImuBatch(times, np.zeros((400, 3)), np.tile([0.0, 0.0, 9.8], (400, 1))))
     with pytest.raises(NotEnoughDataError, match="one plane"):

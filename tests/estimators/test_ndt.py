@@ -14,14 +14,15 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from bentwing import estimators, geometry
-from bentwing.errors import NotEnoughDataError, PayloadError
-from bentwing.estimators.ndt import NdtSettings
+from bentwing import odometry
+from bentwing.base import geometry
+from bentwing.base.errors import NotEnoughDataError, PayloadError
+from bentwing.base.trajectory import read_tum
 from bentwing.evaluate.trajectory import absolute_error
-from bentwing.preprocess import preprocess
+from bentwing.odometry.ndt import NdtSettings
 from bentwing.recording import ImuBatch, LidarBatch, Payload, Recording
+from bentwing.recording.preprocess import preprocess
 from bentwing.simulate import Scenario, simulate
-from bentwing.trajectory import read_tum
 
 MOST_TILT = 0.015  # rad; the bias of the accelerometer is 4 to 7 mrad of it
 
@@ -31,7 +32,7 @@ def flown(folder, until, *, keep=lambda _: True, payload=None, settings=None):
     payload = payload or Payload.load(folder / "payload.yaml")
     with Recording(folder / "recording.bag", payload) as recording:
         truth, _ = read_tum(folder / "truth_trajectory.txt", recording.clock.start_ns)
-        engine = estimators.create("ndt", payload, settings, 2)
+        engine = odometry.create("ndt", payload, settings, 2)
         for batch in preprocess(recording.batches(0.0, until), payload, Counter()):
             if keep(batch):
                 engine.feed(batch)
@@ -140,20 +141,20 @@ def test_a_silence_in_which_the_place_is_lost_cuts_the_trajectory(simulated):
 def test_a_2d_lidar_is_refused_by_its_kind():
     payload = Payload.model_validate({"lidar": {"kind": "hokuyo-utm30lx"}})
     with pytest.raises(PayloadError, match=r"single planes.*--estimator continuous"):
-        estimators.create("ndt", payload)
+        odometry.create("ndt", payload)
 
 
 def test_a_2d_lidar_of_unknown_kind_is_refused_by_its_points():
     angles = np.linspace(0.0, 6.0, 2000)
     points = np.stack([5 * np.cos(angles), 4 * np.sin(angles), 0 * angles], axis=1)
-    engine = estimators.create("ndt", Payload.default())
+    engine = odometry.create("ndt", Payload.default())
     with pytest.raises(NotEnoughDataError, match="one plane"):
         engine.feed(LidarBatch(points, np.linspace(0.0, 0.3, 2000)))
 
 
 def test_a_motor_without_angles_is_refused(simulated):
     payload = Payload.load(simulated("courtyard", 22.0, head="vlp16-motor") / "payload.yaml")
-    engine = estimators.create("ndt", payload)
+    engine = odometry.create("ndt", payload)
     points = np.random.default_rng(0).normal(size=(1000, 3))
     with pytest.raises(ValueError, match="angles: expected the motor's angle"):
         engine.feed(LidarBatch(points, np.linspace(0.0, 0.3, 1000)))

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from bentwing import Odometry
-from bentwing.estimators import Continuous
-from bentwing.estimators.settings import ContinuousSettings
-from bentwing.preprocess import preprocess
+from bentwing.base.trajectory import read_tum
+from bentwing.odometry import Continuous
+from bentwing.odometry.continuous.settings import ContinuousSettings
 from bentwing.recording import EncoderBatch, ImuBatch, LidarBatch, Payload, Recording
 from bentwing.recording.payload import Encoder, Transform
-from bentwing.trajectory import read_tum
+from bentwing.recording.preprocess import preprocess
 
 LENGTH = 12.0  # s; the rest at the start is over after four
 THINNING = 3  # every third point, for speed

@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 
 import bentwing
-from bentwing.control.spin_target import structure_support
-from bentwing.errors import DivergedError, NotEnoughDataError, PayloadError, UsageError
-from bentwing.estimators import Continuous
-from bentwing.estimators.odometry_pass import OdometryPass
+from bentwing.base.errors import DivergedError, NotEnoughDataError, PayloadError, UsageError
+from bentwing.flight.control.spin_target import structure_support
+from bentwing.odometry import Continuous
+from bentwing.odometry.continuous.odometry_pass import OdometryPass
 from bentwing.recording import ImuBatch, LidarBatch
 
 UP = (0.0, 0.0, 9.81)

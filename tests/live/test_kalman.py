@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from bentwing import Odometry, UsageError
-from bentwing.estimators import Kalman
-from bentwing.estimators.kalman import KalmanSettings
-from bentwing.preprocess import preprocess
+from bentwing.odometry import Kalman
+from bentwing.odometry.kalman import KalmanSettings
 from bentwing.recording import ImuBatch
+from bentwing.recording.preprocess import preprocess
 from bentwing.simulate import Scenario, simulate
 
 SETTINGS = KalmanSettings(rehearsal=4.0)

@@ -8,8 +8,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from bentwing import Odometry, geometry
-from bentwing.estimators.slow_states import INITIAL_STD
+from bentwing import Odometry
+from bentwing.base import geometry
+from bentwing.odometry.continuous.slow_states import INITIAL_STD
 
 
 def test_a_replay_in_pieces_gives_the_bytes_of_the_offline_estimate(flown, estimate, all_bytes):

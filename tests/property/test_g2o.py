@@ -8,8 +8,15 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from bentwing.errors import InputError
-from bentwing.pose_graph import MAP, Links, PoseGraph, nearest_semidefinite, read_g2o, write_g2o
+from bentwing.base.errors import InputError
+from bentwing.closing.pose_graph import (
+    MAP,
+    Links,
+    PoseGraph,
+    nearest_semidefinite,
+    read_g2o,
+    write_g2o,
+)
 
 IDENTITY = " ".join(str(float(i == j)) for i in range(6) for j in range(i, 6))
 VALID = (

@@ -10,11 +10,12 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from bentwing.clock import Clock
-from bentwing.errors import BentwingError
-from bentwing.recording import LidarBatch, Payload, Recording, wire_clouds
+from bentwing.base.clock import Clock
+from bentwing.base.errors import BentwingError
+from bentwing.recording import LidarBatch, Payload, Recording
 from bentwing.recording.lidar_stream import LidarStream
-from bentwing.recording.point_cloud2 import columns
+from bentwing.recording.messages import wire_clouds
+from bentwing.recording.messages.point_cloud2 import columns
 from bentwing.recording.point_times import TimeReading
 from bentwing.recording.streams import EncoderStream, ImuStream
 from bentwing.recording.topics import LASER_SCAN, LIVOX, MULTI_ECHO, POINT_CLOUD

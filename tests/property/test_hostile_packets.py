@@ -10,7 +10,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from bentwing.errors import InputError
+from bentwing.base.errors import InputError
 from bentwing.recording import LidarBatch, Recording
 
 pytest.importorskip("velodyne_decoder", reason='needs pip install "bentwing[packets]"')

@@ -6,7 +6,7 @@ import yaml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from bentwing.errors import PayloadError
+from bentwing.base.errors import PayloadError
 from bentwing.recording.payload import Payload
 
 length = st.floats(-5, 5)

@@ -15,7 +15,7 @@ from benches.peers.attitude import as_trajectory
 from benches.peers.scans import moved
 from benches.peers.tables import stamps_of, xyz_of
 
-from bentwing import geometry
+from bentwing.base import geometry
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

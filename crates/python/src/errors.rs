@@ -68,9 +68,9 @@ pub(crate) fn kalman_error(py: Python<'_>, error: &KalmanError) -> PyErr {
     raised(py, "DivergedError", &error.to_string())
 }
 
-/// An exception of `bentwing.errors`.
+/// An exception of `bentwing.base.errors`.
 fn raised(py: Python<'_>, name: &str, message: &str) -> PyErr {
-    let class = py.import("bentwing.errors").and_then(|m| m.getattr(name));
+    let class = py.import("bentwing.base.errors").and_then(|m| m.getattr(name));
     match class.and_then(|c| c.call1((message,))) {
         Ok(exception) => PyErr::from_value(exception),
         Err(failed) => failed,

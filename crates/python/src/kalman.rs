@@ -22,7 +22,7 @@ type Poses<'py> = (
     Bound<'py, PyArray2<f64>>,
 );
 
-/// Fields as in `bentwing.estimators.kalman.core.FilterSettings`.
+/// Fields as in `bentwing.odometry.kalman.core.FilterSettings`.
 #[derive(FromPyObject)]
 pub(crate) struct KalmanSettings {
     sigma: f64,
@@ -88,7 +88,7 @@ impl From<KalmanSettings> for core::Settings {
     }
 }
 
-/// Fields as in `bentwing.estimators.kalman.core.FilterState`.
+/// Fields as in `bentwing.odometry.kalman.core.FilterState`.
 #[derive(FromPyObject)]
 pub(crate) struct KalmanState {
     pose: Transform,

@@ -8,20 +8,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bentwing.base.errors import BentwingError, EstimationError, PayloadError, RecordingError
+from bentwing.base.mount import MotorMount
 from bentwing.calibrate.from_motion import calibrate_in_motion
 from bentwing.calibrate.motor_mount import calibrate_motor, place
 from bentwing.calibrate.outcome import Calibrated, with_motion, with_motor
 from bentwing.calibrate.revolution import find_stretches, read_course, read_revolutions
 from bentwing.calibrate.wall import best_wall
-from bentwing.errors import BentwingError, EstimationError, PayloadError, RecordingError
-from bentwing.estimators.mount import MotorMount, described_mount
+from bentwing.recording.described import described_mount
 
 if TYPE_CHECKING:
+    from bentwing.base.progress import Progress
     from bentwing.calibrate.motor_mount import MotorCalibration
     from bentwing.calibrate.revolution import Course, Stretch
     from bentwing.calibrate.wall import WallSection
-    from bentwing.preprocess import RecordingPart
-    from bentwing.progress import Progress
+    from bentwing.recording.preprocess import RecordingPart
 
     FromRest = tuple[MotorCalibration, tuple[Stretch, ...], WallSection]
 

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import yaml
 
-from bentwing.atomic import write_text
+from bentwing.base.atomic import write_text
+from bentwing.base.result_folder import RecordedFolder, ResultFolder
 from bentwing.calibrate.outcome import as_record
-from bentwing.run_record import RecordedFolder, ResultFolder
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

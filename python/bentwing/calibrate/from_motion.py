@@ -6,13 +6,13 @@ from __future__ import annotations
 from collections import Counter
 from typing import TYPE_CHECKING
 
-from bentwing import estimators
-from bentwing.estimators.settings import ContinuousSettings
+from bentwing import odometry
+from bentwing.odometry.continuous.settings import ContinuousSettings
 
 if TYPE_CHECKING:
-    from bentwing.estimators.interface import Calibration
-    from bentwing.preprocess import RecordingPart
-    from bentwing.progress import Stage
+    from bentwing.base.calibration import Calibration
+    from bentwing.base.progress import Stage
+    from bentwing.recording.preprocess import RecordingPart
 
 
 def calibrate_in_motion(
@@ -32,9 +32,7 @@ def calibrate_in_motion(
         The recording cannot be followed.
     """
     frozen = ("motor_tilt", "motor_offset") if motor_is_known else ()
-    engine = estimators.create(
-        "continuous", part.payload, ContinuousSettings(frozen=frozen), threads
-    )
+    engine = odometry.create("continuous", part.payload, ContinuousSettings(frozen=frozen), threads)
     for batch in part.batches(shown, Counter()):
         engine.feed(batch)
     return engine.result().calibration

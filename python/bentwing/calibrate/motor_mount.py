@@ -22,10 +22,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing import geometry
+from bentwing.base import geometry
+from bentwing.base.errors import DivergedError, RecordingError
+from bentwing.base.mount import Pose
 from bentwing.calibrate.cells import find_pairs
-from bentwing.errors import DivergedError, RecordingError
-from bentwing.estimators.mount import Pose
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

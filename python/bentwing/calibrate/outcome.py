@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bentwing import geometry
+from bentwing.base import geometry
+from bentwing.base.mount import FixedMount, Pose
 from bentwing.calibrate.motor_mount import OFFSET_PRIOR
-from bentwing.estimators.mount import FixedMount, Pose
 from bentwing.recording.payload import CalibrationRecord, Transform
 
 if TYPE_CHECKING:
+    from bentwing.base.calibration import Calibration
     from bentwing.calibrate.motor_mount import MotorCalibration
     from bentwing.calibrate.revolution import Stretch
     from bentwing.calibrate.wall import WallSection
-    from bentwing.estimators.interface import Calibration
     from bentwing.recording import Payload
 
 # A shift is observable if the recording made it so much more certain than it was assumed to be, and the

@@ -10,17 +10,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.signal import savgol_filter
 
-from bentwing.errors import NotEnoughDataError, PayloadError, RecordingError
-from bentwing.preprocess import preprocess
+from bentwing.base.errors import NotEnoughDataError, PayloadError, RecordingError
 from bentwing.recording import EncoderBatch, ImuBatch, LidarBatch
+from bentwing.recording.preprocess import preprocess
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from bentwing.preprocess import RecordingPart
-    from bentwing.progress import Stage
+    from bentwing.base.progress import Stage
+    from bentwing.recording.preprocess import RecordingPart
 
     Array = NDArray[np.float64]
 

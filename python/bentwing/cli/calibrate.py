@@ -33,11 +33,11 @@ def calibrate_command(  # noqa: PLR0917 - one parameter per option
     # slow to import, so only when it is needed
     from rich.console import Console
 
+    from bentwing.base.progress import create_progress
     from bentwing.calibrate import CalibrationFolder, calibrate
     from bentwing.cli.calibration_page import page
-    from bentwing.preprocess import RecordingPart
-    from bentwing.progress import create_progress
     from bentwing.recording import Payload, Recording
+    from bentwing.recording.preprocess import RecordingPart
     from bentwing.report import draw_wall
 
     head = Payload.load(payload)

@@ -47,12 +47,12 @@ def evaluate_command(
     # slow to import, so only when it is needed
     from rich.console import Console
 
+    from bentwing.base.errors import UsageError
+    from bentwing.base.progress import create_progress
     from bentwing.cli.evaluation_table import tables
-    from bentwing.errors import UsageError
     from bentwing.evaluate.evaluation import Question, evaluate
     from bentwing.evaluate.folder import EvaluationFolder
     from bentwing.evaluate.subject import find_subject
-    from bentwing.progress import create_progress
     from bentwing.report import draw_evaluation
 
     subject = find_subject(run)
@@ -80,7 +80,7 @@ def evaluate_command(
 
 
 def _arm(given: str) -> tuple[float, float, float]:
-    from bentwing.errors import UsageError
+    from bentwing.base.errors import UsageError
 
     try:
         x, y, z = (float(value) for value in given.split(","))

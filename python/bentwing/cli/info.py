@@ -11,8 +11,8 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
+from bentwing.calibrate.inspection import inspect
 from bentwing.cli.info_page import page
-from bentwing.inspection import inspect
 from bentwing.recording import Payload
 
 

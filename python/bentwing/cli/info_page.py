@@ -13,9 +13,9 @@ if TYPE_CHECKING:
 
     from rich.console import RenderableType
 
-    from bentwing.inspection import Inspection
-    from bentwing.inspection.inspect import TopicReport
-    from bentwing.inspection.spin import Spin
+    from bentwing.calibrate.inspection import Inspection
+    from bentwing.calibrate.inspection.inspect import TopicReport
+    from bentwing.calibrate.inspection.spin import Spin
 
 BARS = "▁▂▃▄▅▆▇█"
 SPARKLINE_WIDTH = 60

@@ -43,8 +43,8 @@ def localize_command(
     disappeared since.
     """
     # slow to import, so only when it is needed
-    from bentwing.pipeline import map_recording
-    from bentwing.progress import create_progress
+    from bentwing.base.progress import create_progress
+    from bentwing.run.pipeline import map_recording
 
     map_recording(
         recording,

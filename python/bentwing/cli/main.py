@@ -10,8 +10,8 @@ from typing import Annotated
 
 import typer
 
+from bentwing.base.errors import BentwingError
 from bentwing.cli.commands import LazyCommands
-from bentwing.errors import BentwingError
 
 INTERRUPTED = 130
 _UNEXPECTED = 70  # EX_SOFTWARE of sysexits.h
@@ -35,7 +35,7 @@ app = typer.Typer(
 
 def _print_version(wanted: bool) -> None:  # noqa: FBT001 - typer calls it so
     if wanted:
-        from bentwing.run_record import bentwing_version
+        from bentwing.base.provenance import bentwing_version
 
         typer.echo(f"bentwing {bentwing_version()}")
         raise typer.Exit

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
-    from bentwing.georeference import GeoreferenceSettings
+    from bentwing.closing.georeference import GeoreferenceSettings
 
 
 def map_command(
@@ -73,14 +73,14 @@ def map_command(
 ) -> None:
     """Turn a recording into a trajectory, a map and a report."""
     # slow to import, so only when it is needed
+    from bentwing.base.errors import UsageError
+    from bentwing.base.progress import create_progress
     from bentwing.cli.merge import say_maps
-    from bentwing.errors import UsageError
-    from bentwing.flights import map_flights
     from bentwing.map.clean import CleanSettings
-    from bentwing.pipeline import map_recording
-    from bentwing.progress import create_progress
     from bentwing.recording.flights import flights_of
-    from bentwing.run_settings import settings_text
+    from bentwing.run.flights import map_flights
+    from bentwing.run.pipeline import map_recording
+    from bentwing.run.settings import settings_text
 
     if print_settings:
         typer.echo(settings_text(estimator, payload))
@@ -122,8 +122,8 @@ def georeferencing_settings(
     UsageError
         If the mode is none of the known ones.
     """
-    from bentwing.errors import UsageError
-    from bentwing.georeference.settings import GeoreferenceSettings
+    from bentwing.base.errors import UsageError
+    from bentwing.closing.georeference.settings import GeoreferenceSettings
 
     if mode not in {"rigid", "constraints", "off"}:
         msg = f"--georeference {mode!r} is not known; choose rigid, constraints or off"

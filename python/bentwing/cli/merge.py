@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from bentwing.merging import Merged
+    from bentwing.run.merging import Merged
 
 
 def merge_command(
@@ -37,9 +37,9 @@ def merge_command(
     Runs that have no place in common become maps of their own, in folders of their own.
     """
     # slow to import, so only when it is needed
+    from bentwing.base.progress import create_progress
     from bentwing.map.clean import CleanSettings
-    from bentwing.merging import merge
-    from bentwing.progress import create_progress
+    from bentwing.run.merging import merge
 
     merged = merge(
         runs,

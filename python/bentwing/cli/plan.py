@@ -11,9 +11,9 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from bentwing.atomic import write_text
+from bentwing.base.atomic import write_text
 from bentwing.cli.plan_page import as_record, page
-from bentwing.plan import Intent, plan_flight
+from bentwing.flight.plan import Intent, plan_flight
 from bentwing.recording import Payload
 
 Option = typer.Option

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from rich.console import RenderableType
 
-    from bentwing.plan import Plan
+    from bentwing.flight.plan import Plan
 
 _MAP_ROWS, _MAP_COLUMNS = 12, 48
 _LEAST_COVERAGE = 0.05

@@ -30,7 +30,7 @@ def reproduce_command(
     from rich.console import Console
     from rich.table import Table
 
-    from bentwing.progress import create_progress
+    from bentwing.base.progress import create_progress
     from bentwing.reproduce import reproduce
 
     progress = create_progress(quiet=quiet)

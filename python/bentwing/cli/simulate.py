@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from rich.console import Console
 from rich.progress import Progress
 
-from bentwing.errors import UsageError
+from bentwing.base.errors import UsageError
 from bentwing.simulate import Scenario, simulate
 from bentwing.simulate.events import EventName
 from bentwing.simulate.scenario import FlightName, HeadName, SceneName

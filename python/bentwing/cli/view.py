@@ -32,8 +32,8 @@ def view_command(  # noqa: PLR0917 - one parameter per option
     quiet: Annotated[bool, Option("--quiet", "-q", help="No progress.")] = False,
 ) -> None:
     """Show a run in rerun: the map as it grows on three levels of detail, path, surfels, windows."""
-    from bentwing.progress import create_progress
-    from bentwing.view import view_run, write_frames, write_pictures
+    from bentwing.base.progress import create_progress
+    from bentwing.report.view import view_run, write_frames, write_pictures
 
     progress = create_progress(quiet=quiet)
     if pictures is not None:

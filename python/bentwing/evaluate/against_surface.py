@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing.errors import InputError
+from bentwing.base.errors import InputError
 from bentwing.evaluate.alignment import Alignment
 from bentwing.evaluate.clouds import Cloud
 from bentwing.evaluate.map import surface_error
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from bentwing.trajectory import Trajectory
+    from bentwing.base.trajectory import Trajectory
 
 THRESHOLD = 0.3  # m, of the paper: what is farther away has changed between the measurements
 _EDGES = (0.1, 0.5)  # m, least and greatest distance between surfels

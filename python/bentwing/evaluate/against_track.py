@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing import geometry
-from bentwing.clock import NS_PER_S
-from bentwing.errors import InputError
+from bentwing.base import geometry
+from bentwing.base.clock import NS_PER_S
+from bentwing.base.errors import InputError
+from bentwing.base.trajectory import Trajectory
 from bentwing.evaluate.alignment import Alignment, align, without_frame_rotation
 from bentwing.evaluate.relative import (
     RelativeError,
@@ -23,7 +24,6 @@ from bentwing.evaluate.statistics import SAMPLES, Box, Statistics
 from bentwing.evaluate.track import bridges
 from bentwing.evaluate.tracked_point import TrackedPoint, find_tracked_point, moved_to_point
 from bentwing.evaluate.trajectory import angles
-from bentwing.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

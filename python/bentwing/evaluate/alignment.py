@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing import geometry
-from bentwing.errors import InputError
-from bentwing.trajectory import Trajectory
+from bentwing.base import geometry
+from bentwing.base.errors import InputError
+from bentwing.base.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

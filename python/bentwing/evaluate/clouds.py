@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bentwing.errors import InputError
+from bentwing.base.errors import InputError
 from bentwing.map.chunk import MapChunk
 from bentwing.map.read import MapPart, read_parts
 from bentwing.map.sample import MapSample

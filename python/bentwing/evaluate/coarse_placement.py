@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing import geometry
+from bentwing.base import geometry
 from bentwing.evaluate.alignment import Alignment
 
 if TYPE_CHECKING:

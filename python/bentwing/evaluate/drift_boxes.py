@@ -10,7 +10,7 @@ from bentwing.evaluate.statistics import Box
 from bentwing.evaluate.trajectory import Drift, drift
 
 if TYPE_CHECKING:
-    from bentwing.trajectory import Trajectory
+    from bentwing.base.trajectory import Trajectory
 
 LENGTHS = (5.0, 10.0, 20.0, 50.0, 100.0, 200.0)  # m
 _FEWEST = 10  # segments that make a distribution

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing.errors import UsageError
+from bentwing.base.errors import UsageError
+from bentwing.base.progress import Progress
+from bentwing.base.trajectory import Trajectory, read_tum
 from bentwing.evaluate.against_surface import (
     THRESHOLD,
     MapError,
@@ -25,8 +27,6 @@ from bentwing.evaluate.revisits import Revisits, revisit_consistency
 from bentwing.evaluate.spacing import PointSpacing, point_spacing
 from bentwing.evaluate.track import read_track
 from bentwing.evaluate.tracked_point import moved_to_point
-from bentwing.progress import Progress
-from bentwing.trajectory import Trajectory, read_tum
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -5,8 +5,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from bentwing.base.result_folder import RecordedFolder, ResultFolder
 from bentwing.evaluate.statistics import summary
-from bentwing.run_record import RecordedFolder, ResultFolder
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing import geometry
+from bentwing.base import geometry
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from bentwing.trajectory import Trajectory
+    from bentwing.base.trajectory import Trajectory
 
     Array = NDArray[np.float64]
     Pose = tuple[Array, Array]

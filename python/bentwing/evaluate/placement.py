@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing import geometry
-from bentwing.errors import InputError
+from bentwing.base import geometry
+from bentwing.base.errors import InputError
 from bentwing.evaluate.alignment import Alignment
 from bentwing.evaluate.coarse_placement import coarse_placements
 from bentwing.evaluate.robust import scale, tukey

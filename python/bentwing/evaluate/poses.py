@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing import geometry
+from bentwing.base import geometry
 from bentwing.evaluate.alignment import associate
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from bentwing.trajectory import Trajectory
+    from bentwing.base.trajectory import Trajectory
 
 
 @dataclass(frozen=True, slots=True)

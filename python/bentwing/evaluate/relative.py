@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing import geometry
+from bentwing.base import geometry
 from bentwing.evaluate.statistics import Statistics
 from bentwing.evaluate.trajectory import angles
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from bentwing.trajectory import Trajectory
+    from bentwing.base.trajectory import Trajectory
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,7 @@ import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from bentwing.errors import UsageError
+from bentwing.base.errors import UsageError
 from bentwing.map.read import MAP_SUFFIXES
 
 if TYPE_CHECKING:

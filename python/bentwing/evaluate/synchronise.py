@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing.errors import InputError
+from bentwing.base.errors import InputError
 from bentwing.evaluate.track import bridges
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from bentwing.base.trajectory import Trajectory
     from bentwing.evaluate.track import Track
-    from bentwing.trajectory import Trajectory
 
 _CHORD = 0.5  # s over which a speed is measured, or two intervals of the reference
 _STEPS = 5  # of the search, per chord

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing.clock import NS_PER_S
-from bentwing.errors import InputError
-from bentwing.trajectory import read_stamped_rows
+from bentwing.base.clock import NS_PER_S
+from bentwing.base.errors import InputError
+from bentwing.base.trajectory import read_stamped_rows
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing import geometry
-from bentwing.clock import NS_PER_S
-from bentwing.errors import InputError
+from bentwing.base import geometry
+from bentwing.base.clock import NS_PER_S
+from bentwing.base.errors import InputError
+from bentwing.base.trajectory import Trajectory
 from bentwing.evaluate.alignment import Alignment, align
 from bentwing.evaluate.robust import cauchy, scale
 from bentwing.evaluate.synchronise import coarse_shifts
 from bentwing.evaluate.track import bridges
-from bentwing.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing import geometry
+from bentwing.base import geometry
 from bentwing.evaluate.alignment import Alignment, align, associate, without_frame_rotation
 from bentwing.evaluate.statistics import Statistics
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from bentwing.trajectory import Trajectory
+    from bentwing.base.trajectory import Trajectory
 
 Interval = tuple[float, float]
 _ODOMETER_STEP = 0.1  # s; the length of the way is measured in these, so that vibration adds none

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from bentwing.estimators.core_states import core_globals, core_samples
-from bentwing.estimators.mount import MotorMount
+from bentwing.base.mount import MotorMount
 from bentwing.map.chunk import MapChunk
 from bentwing.map.mixed_pixels import mixed_pixels
+from bentwing.odometry.core_states import core_globals, core_samples
 from bentwing.recording.batches import LidarBatch
 
 if TYPE_CHECKING:
@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from bentwing.estimators.interface import Calibration
+    from bentwing.base.calibration import Calibration
+    from bentwing.base.trajectory import Trajectory
     from bentwing.recording.batches import Batch
-    from bentwing.trajectory import Trajectory
 
 _Scalar = TypeVar("_Scalar", bound=np.generic)
 

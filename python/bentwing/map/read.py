@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bentwing.errors import BentwingError, InputError
+from bentwing.base.errors import BentwingError, InputError
 from bentwing.map.read_e57 import e57_scans
 from bentwing.map.read_rows import PART, pcd_rows, ply_rows
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 
-from bentwing.errors import InputError
+from bentwing.base.errors import InputError
 from bentwing.map.lzf import decompress_lzf
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing.atomic import temporary_name
+from bentwing.base.atomic import temporary_name
 from bentwing.map.chunk import MapChunk
 
 if TYPE_CHECKING:

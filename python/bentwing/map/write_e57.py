@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bentwing.errors import UsageError
+from bentwing.base.errors import UsageError
 from bentwing.map.writer import MapWriter, round_offset
 
 if TYPE_CHECKING:

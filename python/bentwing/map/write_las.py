@@ -9,7 +9,7 @@ import laspy
 import numpy as np
 from laspy.vlrs.known import WktCoordinateSystemVlr
 
-from bentwing.errors import EstimationError
+from bentwing.base.errors import EstimationError
 from bentwing.map.compress_laz import LazBackend
 from bentwing.map.gps_time import adjusted_gps_origin
 from bentwing.map.writer import MapWriter, round_offset

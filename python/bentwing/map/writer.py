@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from bentwing.atomic import publish, temporary_name
-from bentwing.errors import UsageError
+from bentwing.base.atomic import publish, temporary_name
+from bentwing.base.errors import UsageError
 from bentwing.map.chunk import MapChunk
 
 if TYPE_CHECKING:

@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bentwing.recording.messages.wire import BrokenMessageError, align, broken_if_malformed, header
 from bentwing.recording.stamps import StampMonitor
-from bentwing.recording.wire import BrokenMessageError, align, broken_if_malformed, header
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from numpy.typing import NDArray
 
-    from bentwing.clock import Clock
+    from bentwing.base.clock import Clock
 
 # What a receiver that does not know its accuracy is trusted with, m, east, north and up.
 UNKNOWN_SIGMAS = (3.0, 3.0, 6.0)

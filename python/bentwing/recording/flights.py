@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bentwing.clock import NS_PER_S
-from bentwing.recording.source import open_source
+from bentwing.base.clock import NS_PER_S
+from bentwing.recording.containers.source import open_source
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

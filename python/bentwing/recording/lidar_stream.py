@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing.errors import RecordingError
-from bentwing.recording import laser_scan, point_cloud2, problems, wire, wire_clouds, wire_scans
+from bentwing.base.errors import RecordingError
+from bentwing.recording import problems
 from bentwing.recording.batches import LidarBatch
+from bentwing.recording.messages import laser_scan, point_cloud2, wire, wire_clouds, wire_scans
 from bentwing.recording.stamps import StampMonitor
 from bentwing.recording.sweeps import SweepMerger
 from bentwing.recording.topics import LASER_SCAN, LIVOX, MULTI_ECHO, POINT_CLOUD
@@ -18,11 +19,11 @@ from bentwing.recording.topics import LASER_SCAN, LIVOX, MULTI_ECHO, POINT_CLOUD
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from bentwing.clock import Clock
+    from bentwing.base.clock import Clock
+    from bentwing.recording.messages.wire_clouds import RawLivox
+    from bentwing.recording.messages.wire_scans import RawScan
     from bentwing.recording.point_times import TimeReading
     from bentwing.recording.streams import RawMessage
-    from bentwing.recording.wire_clouds import RawLivox
-    from bentwing.recording.wire_scans import RawScan
 
 MAX_LIVOX_OFFSET_NS = 1_000_000_000
 

@@ -6,14 +6,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from bentwing.recording.lidar_stream import LidarStream
-from bentwing.recording.packet_clock import PacketClock
-from bentwing.recording.packet_streams import PacketImuStream, PacketLidarStream
+from bentwing.recording.packets.clock import PacketClock
+from bentwing.recording.packets.streams import PacketImuStream, PacketLidarStream
 from bentwing.recording.streams import EncoderStream, ImuStream
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from bentwing.clock import Clock
+    from bentwing.base.clock import Clock
     from bentwing.recording.peek import Peek
     from bentwing.recording.streams import Stream
 

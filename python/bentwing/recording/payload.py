@@ -22,7 +22,7 @@ from pydantic import (
     model_validator,
 )
 
-from bentwing.errors import PayloadError
+from bentwing.base.errors import PayloadError
 from bentwing.recording.lidar_kinds import KIND_DEFAULTS, LidarKind, VelodyneModel
 from bentwing.recording.payload_errors import describe
 

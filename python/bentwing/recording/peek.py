@@ -10,18 +10,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing.errors import RecordingError
-from bentwing.recording import laser_scan, point_cloud2, point_times, wire, wire_clouds, wire_scans
+from bentwing.base.errors import RecordingError
+from bentwing.recording import point_times
+from bentwing.recording.messages import laser_scan, point_cloud2, wire, wire_clouds, wire_scans
 from bentwing.recording.topics import LASER_SCAN, LIVOX, MULTI_ECHO, POINT_CLOUD
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from bentwing.recording.packet_clock import ClockReading
-    from bentwing.recording.packet_sensors import ImuPackets, LidarPackets
+    from bentwing.recording.containers.scanned import TopicInfo
+    from bentwing.recording.containers.source import Source
+    from bentwing.recording.packets.clock import ClockReading
+    from bentwing.recording.packets.sensors import ImuPackets, LidarPackets
     from bentwing.recording.point_times import TimeReading
-    from bentwing.recording.scanned import TopicInfo
-    from bentwing.recording.source import Source
 
 N_PEEKED = 5  # messages; a cloud can be large and its chunk slow to decompress
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from bentwing.clock import NS_PER_S
+from bentwing.base.clock import NS_PER_S
 from bentwing.recording.topics import LASER_SCAN, MULTI_ECHO
 
 if TYPE_CHECKING:

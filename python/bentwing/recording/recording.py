@@ -7,16 +7,16 @@ from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bentwing.clock import NS_PER_S, Clock
-from bentwing.errors import PayloadError, RecordingError
+from bentwing.base.clock import NS_PER_S, Clock
+from bentwing.base.errors import PayloadError, RecordingError
 from bentwing.recording import imu_units, problems
+from bentwing.recording.containers.source import open_source
 from bentwing.recording.fixes import Fixes, read_fixes
 from bentwing.recording.open_streams import open_streams
-from bentwing.recording.packet_peek import peek_imu, peek_lidar
+from bentwing.recording.packets.peek import peek_imu, peek_lidar
 from bentwing.recording.payload import Payload
 from bentwing.recording.peek import Peek, peek
 from bentwing.recording.slots import group_into_slots, trimmed
-from bentwing.recording.source import open_source
 from bentwing.recording.stream_warnings import stream_warnings
 from bentwing.recording.topics import NAV_SAT_FIX, PACKET_TYPES, resolve
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from typing_extensions import Self
 
     from bentwing.recording.batches import Batch
-    from bentwing.recording.scanned import TopicInfo
+    from bentwing.recording.containers.scanned import TopicInfo
     from bentwing.recording.streams import Stream
 
 SEEK_MARGIN = 5.0  # s by which messages may reach the recorder late

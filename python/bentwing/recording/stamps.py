@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from bentwing.errors import RecordingError
+from bentwing.base.errors import RecordingError
 
 if TYPE_CHECKING:
     from collections import Counter

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from bentwing.clock import Clock
+    from bentwing.base.clock import Clock
     from bentwing.recording.streams import Stream
 
 MAX_LISTED = 3

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from bentwing.recording import wire
 from bentwing.recording.batches import EncoderBatch, ImuBatch
+from bentwing.recording.messages import wire
 from bentwing.recording.stamps import StampMonitor
 
 if TYPE_CHECKING:
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from bentwing.clock import Clock
+    from bentwing.base.clock import Clock
     from bentwing.recording.batches import Batch
 
 RawMessage = tuple[int, bytes]  # recorder's time in ns, bytes

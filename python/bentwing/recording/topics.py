@@ -5,13 +5,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from bentwing.errors import RecordingError
+from bentwing.base.errors import RecordingError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from bentwing.recording.containers.scanned import TopicInfo
     from bentwing.recording.payload import Payload
-    from bentwing.recording.scanned import TopicInfo
 
 LASER_SCAN = "sensor_msgs/msg/LaserScan"
 MULTI_ECHO = "sensor_msgs/msg/MultiEchoLaserScan"

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bentwing import geometry
+from bentwing.base import geometry
 from bentwing.report.sections import DASH, table
 
 if TYPE_CHECKING:

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing.atomic import write_bytes
-from bentwing.errors import UsageError
+from bentwing.base.atomic import write_bytes
+from bentwing.base.errors import UsageError
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing.atomic import write_text
+from bentwing.base.atomic import write_text
 from bentwing.evaluate.robust import Line
 from bentwing.report.charts import BoxGroup, Sample, box_plot, histogram, scatter
 from bentwing.report.error_map import draw_error_map, write_error_cloud

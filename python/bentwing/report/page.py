@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bentwing.atomic import write_text
+from bentwing.base.atomic import write_text
 from bentwing.evaluate.map import wall_thickness
 from bentwing.evaluate.revisits import revisit_consistency
 from bentwing.report import sections
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from bentwing.trajectory import Trajectory
+    from bentwing.base.trajectory import Trajectory
 
 Spin = tuple["NDArray[np.float64]", "NDArray[np.float64]"]
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from bentwing.atomic import write_bytes
+from bentwing.base.atomic import write_bytes
 from bentwing.report.colours import HEIGHT, colour
 from bentwing.report.occlusion import ambient
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from bentwing.trajectory import Trajectory
+    from bentwing.base.trajectory import Trajectory
 
 Row = tuple[str, ...]
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from bentwing.trajectory import Trajectory
+    from bentwing.base.trajectory import Trajectory
 
 _WAY = ("1f2933", "c8412e")  # seen in all directions, and not
 SLAB = 1.0  # m, thickness of the section

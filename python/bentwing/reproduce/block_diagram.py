@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from bentwing.report.svg import FAINT, INK, open_svg, text
 
 if TYPE_CHECKING:
-    from bentwing.control import SpinSettings
+    from bentwing.flight.control import SpinSettings
 
 _BOX = (130, 40)
 _ROWS = (50, 130, 210)  # pixels, middle of the three terms

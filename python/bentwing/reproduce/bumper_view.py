@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing.control import BumperSettings, CarrierState, VirtualBumper
+from bentwing.flight.control import BumperSettings, CarrierState, VirtualBumper
 from bentwing.report.colours import HEIGHT
 from bentwing.report.picture import render
 from bentwing.report.svg import GRID, INK, map_view, open_svg, text

@@ -13,13 +13,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bentwing import geometry
-from bentwing.errors import InputError
+from bentwing.base import geometry
+from bentwing.base.errors import InputError
+from bentwing.base.trajectory import Trajectory
 from bentwing.evaluate.alignment import align, associate
 from bentwing.evaluate.trajectory import absolute_error
 from bentwing.reproduce.trials import attempt, motor_stopped, points_of, true_calibration
-from bentwing.simulate.scenario import Scenario, simulate
-from bentwing.trajectory import Trajectory
+from bentwing.simulate.scenario import Scenario
+from bentwing.simulate.simulation import simulate
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing import geometry
+from bentwing.base import geometry
 from bentwing.report.colours import HEIGHT
 from bentwing.report.picture import paint, project
 from bentwing.report.plot import Series, line_plot
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from bentwing.trajectory import Trajectory
+    from bentwing.base.trajectory import Trajectory
 
     Array = NDArray[np.float64]
 

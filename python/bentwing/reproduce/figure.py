@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from bentwing.progress import Progress
+from bentwing.base.progress import Progress
 
 if TYPE_CHECKING:
     from pathlib import Path

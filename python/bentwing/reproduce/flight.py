@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bentwing.control import SpinSettings
+from bentwing.flight.control import SpinSettings
 from bentwing.report.histogram import histogram
 from bentwing.report.plot import Series, line_plot
 from bentwing.reproduce.block_diagram import controller_diagram

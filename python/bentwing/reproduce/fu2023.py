@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from bentwing.estimators.kalman import KalmanSettings
+from bentwing.odometry.kalman import KalmanSettings
 from bentwing.reproduce.campaign import flight_job, gather
 from bentwing.reproduce.figure import Compared, Part, TextTable
 from bentwing.reproduce.fu_figures import fu_figures

@@ -11,26 +11,28 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import yaml
 
-from bentwing.clock import NS_PER_S, format_ns
-from bentwing.estimators.mount import FixedMount, Pose
+from bentwing.base.clock import NS_PER_S, format_ns
+from bentwing.base.mount import FixedMount, Pose
+from bentwing.base.trajectory import Trajectory, read_tum
 from bentwing.map.chunk import MapChunk
 from bentwing.map.project import project
 from bentwing.map.writer import open_map
-from bentwing.pipeline import map_recording
-from bentwing.preprocess import RecordingPart
 from bentwing.recording import Payload, Recording
+from bentwing.recording.preprocess import RecordingPart
+from bentwing.run.pipeline import map_recording
 from bentwing.simulate.instruments import TerrestrialErrors, choose_stations, scan, track
 from bentwing.simulate.ros import EPOCH_NS
-from bentwing.simulate.scenario import Scenario, prepare
+from bentwing.simulate.scenario import Scenario
+from bentwing.simulate.simulation import prepare
 from bentwing.simulate.write import write_recording
-from bentwing.trajectory import Trajectory, read_tum
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from bentwing.reproduce.figure import Assignment
-    from bentwing.run import Run
-    from bentwing.simulate.scenario import SceneName, Setup
+    from bentwing.run.run import Run
+    from bentwing.simulate.scenario import SceneName
+    from bentwing.simulate.setup import Setup
     from bentwing.simulate.write import SimulatedRecording
 
 N_STATIONS = 6

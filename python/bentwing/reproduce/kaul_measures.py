@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bentwing.base.trajectory import read_tum
 from bentwing.evaluate.against_surface import compare_with_map, read_reference
 from bentwing.evaluate.against_track import compare_with_track
 from bentwing.evaluate.clouds import Cloud
@@ -22,15 +23,14 @@ from bentwing.reproduce.kaul_flights import (
     write_terrestrial,
     write_track,
 )
-from bentwing.trajectory import read_tum
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from bentwing.base.trajectory import Trajectory
     from bentwing.evaluate.trajectory import AbsoluteError
     from bentwing.reproduce.figure import Assignment
     from bentwing.reproduce.kaul_flights import Flown
-    from bentwing.trajectory import Trajectory
 
 MOVED = 0.1  # m from the first place: in flight
 

@@ -13,23 +13,23 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing import geometry
+from bentwing.base import geometry
+from bentwing.base.trajectory import Trajectory
+from bentwing.closing.global_registration import close_loops
+from bentwing.closing.places import MatchSettings, describe_run, link_between, match_places
+from bentwing.closing.pose_graph import Links, PoseGraph, deform_trajectory, solve
 from bentwing.evaluate.trajectory import absolute_error
-from bentwing.global_registration import close_loops
-from bentwing.places import MatchSettings, describe_run, link_between, match_places
-from bentwing.pose_graph import Links, PoseGraph, deform_trajectory, solve
-from bentwing.preprocess import RecordingPart
 from bentwing.recording import Payload, Recording
+from bentwing.recording.preprocess import RecordingPart
 from bentwing.report.colours import TIME
 from bentwing.report.picture import paint, project
 from bentwing.report.svg import map_view
 from bentwing.reproduce.figure import Compared, Figure
-from bentwing.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from bentwing.places import Place
+    from bentwing.closing.places import Place
     from bentwing.reproduce.figure import Assignment
     from bentwing.reproduce.kaul_flights import Flown
 

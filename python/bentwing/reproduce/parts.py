@@ -7,9 +7,11 @@ import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from bentwing.atomic import write_bytes, write_text
-from bentwing.errors import UsageError
-from bentwing.progress import Progress
+from bentwing.base.atomic import write_bytes, write_text
+from bentwing.base.errors import UsageError
+from bentwing.base.plain import plain
+from bentwing.base.progress import Progress
+from bentwing.base.provenance import bentwing_version
 from bentwing.report.raster import rasterize
 from bentwing.report.svg import standalone
 from bentwing.reproduce.figure import Assignment
@@ -18,7 +20,6 @@ from bentwing.reproduce.fu2023 import fu_part
 from bentwing.reproduce.mapping import mapping_part
 from bentwing.reproduce.page import page
 from bentwing.reproduce.tazir2020 import tazir_part
-from bentwing.run_record import bentwing_version, plain
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

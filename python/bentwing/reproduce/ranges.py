@@ -9,13 +9,14 @@ import numpy as np
 
 from bentwing.report.plot import Series, line_plot
 from bentwing.reproduce.figure import Compared, Figure
-from bentwing.simulate.scenario import Scenario, prepare
+from bentwing.simulate.scenario import Scenario
+from bentwing.simulate.simulation import prepare
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bentwing.reproduce.figure import Assignment
-    from bentwing.simulate.scenario import Setup
+    from bentwing.simulate.setup import Setup
 
 _EVERY, _LONG = 6.0, 1.0  # s; so long is looked at so often
 _SPIN_UP, _LANDING = 12.0, 8.0  # s at the ends of a flight that are left out

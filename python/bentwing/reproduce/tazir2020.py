@@ -3,30 +3,26 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bentwing.evaluate.poses import pose_errors
 from bentwing.reproduce.campaign import flight_job, gather
 from bentwing.reproduce.figure import Compared, Part, TextTable
 from bentwing.reproduce.tazir_figures import tazir_figures
+from bentwing.reproduce.tazir_measures import Measured, measure
 from bentwing.reproduce.tazir_walls import WALLS, density_table, wall_figures, wall_job
 from bentwing.reproduce.trials import Flight, Trial
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from bentwing.evaluate.poses import PoseErrors
     from bentwing.reproduce.campaign import Flown, Result
     from bentwing.reproduce.figure import Assignment
     from bentwing.reproduce.tazir_walls import Covered
 
     Array = NDArray[np.float64]
 
-FAR = 1.0
-"""m, of RTE: the estimate has left the way."""
 _BOTH = (Trial("ndt", "ndt"), Trial("continuous", "continuous"))
 _AIR = {"flight": "survey", "calibrated": True}
 
@@ -60,24 +56,6 @@ _RTE_AIMS = (
 )
 
 
-@dataclass(frozen=True, slots=True)
-class Measured:
-    """Errors of a result in the paper's measures.
-
-    Attributes
-    ----------
-    errors : RTE (m) and RRE (rad) at the truth's stamps that the estimate covers
-    way : (N,) m, flown until then
-    lost_after : m, of the way, at which the RTE first exceeds `FAR`; None: never
-    registration : (K, 2) s and m, times and RMSE of the registered scans
-    """
-
-    errors: PoseErrors
-    way: Array
-    lost_after: float | None
-    registration: Array
-
-
 def tazir_part(assignment: Assignment) -> Part:
     """Fly, estimate, compare and draw."""
     jobs = [flight_job(f, assignment) for f in FLIGHTS] + [wall_job(w, assignment) for w in WALLS]
@@ -101,19 +79,6 @@ def tazir_part(assignment: Assignment) -> Part:
     tables = [_table(flown, measured), density_table(walls)]
     title = "Tazir 2020: rotating and fixed Velodyne platforms"
     return Part(title, figures, numbers, _compared(measured), tables)
-
-
-def measure(flight: Flown, result: Result) -> Measured:
-    """Measure a result that has a trajectory."""
-    if result.trajectory is None:
-        msg = f"{flight.flight.name}: expected an estimate, got none: {result.why}"
-        raise ValueError(msg)
-    errors = pose_errors(result.trajectory, flight.truth)
-    way = np.interp(errors.times, flight.truth.times, flight.way)
-    far = np.flatnonzero(errors.rte > FAR)
-    registered = [w for w in result.windows if w.get("registration_rmse") is not None]
-    rmse = np.array([(w["time"], w["registration_rmse"]) for w in registered]).reshape(-1, 2)
-    return Measured(errors, way, float(way[far[0]]) if len(far) else None, rmse)
 
 
 def _table(flown: dict[str, Flown], measured: dict[str, dict[str, Measured]]) -> TextTable:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bentwing.reproduce.campaign import Flown
-    from bentwing.reproduce.tazir2020 import Measured
+    from bentwing.reproduce.tazir_measures import Measured
 
     Array = NDArray[np.float64]
     All = Mapping[str, Mapping[str, Measured]]

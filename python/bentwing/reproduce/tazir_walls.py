@@ -9,18 +9,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bentwing.base.trajectory import read_tum
 from bentwing.evaluate.density import wall_density
-from bentwing.preprocess import preprocess
 from bentwing.recording import LidarBatch, Payload, Recording
+from bentwing.recording.preprocess import preprocess
 from bentwing.report.colours import HEIGHT, colour
 from bentwing.report.picture import View
 from bentwing.report.svg import map_view
 from bentwing.reproduce.campaign import Job, steps
 from bentwing.reproduce.figure import Figure, TextTable
 from bentwing.reproduce.trials import Flight, points_of, true_calibration
-from bentwing.simulate.scenario import Scenario, simulate
+from bentwing.simulate.scenario import Scenario
 from bentwing.simulate.scenes.walls import DISTANCE, HALF, TOP
-from bentwing.trajectory import read_tum
+from bentwing.simulate.simulation import simulate
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import yaml
 
-from bentwing import estimators
-from bentwing.errors import BentwingError
-from bentwing.estimators.interface import Calibration
-from bentwing.estimators.mount import FixedMount, MotorMount, Pose
+from bentwing import odometry
+from bentwing.base.calibration import Calibration
+from bentwing.base.errors import BentwingError
+from bentwing.base.mount import FixedMount, MotorMount, Pose
+from bentwing.base.trajectory import Trajectory, read_tum
 from bentwing.map.project import project
-from bentwing.preprocess import preprocess
 from bentwing.recording import LidarBatch, Payload, Recording
-from bentwing.trajectory import Trajectory, read_tum
+from bentwing.recording.preprocess import preprocess
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -26,8 +26,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from bentwing.estimators.interface import Estimate, Estimator
-    from bentwing.estimators.mount import Mount
+    from bentwing.base.estimate import Estimate
+    from bentwing.base.mount import Mount
+    from bentwing.odometry.interface import Estimator
 
     Array = NDArray[np.float64]
 
@@ -79,7 +80,7 @@ def attempt(
     shown : called with the seconds of the recording that are done since the last call
     """
     payload = Payload.load(folder / "payload.yaml")
-    engine = estimators.create(trial.estimator, payload, trial.settings, threads)
+    engine = odometry.create(trial.estimator, payload, trial.settings, threads)
     kept: list[LidarBatch] = []
     estimate, why, reached = None, "", 0.0
     with Recording(folder / "recording.bag", payload) as recording:

@@ -6,7 +6,8 @@ A simulation ends in a recording and enters the pipeline by the front door, like
 
 from __future__ import annotations
 
-from bentwing.simulate.scenario import Scenario, simulate
+from bentwing.simulate.scenario import Scenario
+from bentwing.simulate.simulation import simulate
 from bentwing.simulate.write import SimulatedRecording
 
 __all__ = ["Scenario", "SimulatedRecording", "simulate"]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from bentwing._core import Scene
-from bentwing.simulate.ranging import Beams, incidence
+from bentwing.simulate.ranging import incidence
 from bentwing.simulate.records import CloudRecord, Record, ScanRecord
 from bentwing.simulate.scenes.mesh import ball, box, column, merge
 from bentwing.simulate.scenes.world import World, face_normals
@@ -17,6 +17,7 @@ from bentwing.simulate.scenes.world import World, face_normals
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from bentwing.simulate.beams import Beams
     from bentwing.simulate.imu import ImuErrors
 
     Array = NDArray[np.float64]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from bentwing.geodesy import LevelFrame
+from bentwing.base.geodesy import LevelFrame
 from bentwing.simulate.records import FixRecord
 
 if TYPE_CHECKING:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from bentwing.simulate.beams import Beams
     from bentwing.simulate.kinematics import Motion
     from bentwing.simulate.rig import Rig
     from bentwing.simulate.scenes import World
@@ -27,22 +28,6 @@ if TYPE_CHECKING:
 NODE_STEP = 1e-3
 AIRFRAME_RANGE = 1.2
 """m; farther away there is nothing of the carrier."""
-
-
-@dataclass(frozen=True, slots=True)
-class Beams:
-    """Laser shots in the order of a grid whose neighbours along `sweep_axis` look side by side.
-
-    Attributes
-    ----------
-    times : (A, B) s, IMU clock
-    directions : (A, B, 3) unit vectors, lidar frame
-    sweep_axis : 0 or 1
-    """
-
-    times: Array
-    directions: Array
-    sweep_axis: int
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,29 +1,17 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""A recording with truth, from a few choices and a seed."""
+"""What to simulate: a few choices and a seed."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from bentwing.simulate.events import GAP, LEAD, STALL, EventName, Losses, Person, strong_bias
-from bentwing.simulate.gnss import Receiver, ReceiverName
-from bentwing.simulate.heads.build import build_rig
-from bentwing.simulate.imu import PERFECT, Imu, ImuErrors
-from bentwing.simulate.lidars.interface import LidarClock
-from bentwing.simulate.ranging import Airframe, Mover, RangeErrors, Ranger
-from bentwing.simulate.scenes import SCENES, World
-from bentwing.simulate.stream import Sensors
-from bentwing.simulate.write import SimulatedRecording, write_recording
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
-
-    from bentwing.simulate.rig import Rig
+from bentwing.simulate.events import STALL, EventName, strong_bias
+from bentwing.simulate.gnss import ReceiverName  # noqa: TC001 - pydantic reads the annotations
+from bentwing.simulate.imu import PERFECT, ImuErrors
+from bentwing.simulate.ranging import RangeErrors
 
 SceneName = Literal[
     "courtyard", "compound", "office", "forest", "cave", "mine", "town", "walls", "dam",
@@ -123,77 +111,3 @@ class Scenario(BaseModel):
         return np.random.default_rng(
             [self.seed if of_world else self.flight_seed, *purpose.encode()]
         )
-
-
-@dataclass(frozen=True, slots=True)
-class Setup:
-    """A scenario ready to be recorded.
-
-    Attributes
-    ----------
-    first, last : s, what of the rig's motion is recorded
-    """
-
-    world: World
-    rig: Rig
-    sensors: Sensors
-    first: float
-    last: float
-
-
-def prepare(scenario: Scenario) -> Setup:
-    """Build the world, plan the motion and hang the sensors on it."""
-    first = LEAD if "motion-start" in scenario.events else 0.0
-    last = first + scenario.duration
-    site = SCENES[scenario.scene](scenario.rng("scene"))
-    world = World(site if scenario.speed is None else replace(site, speed=scenario.speed))
-    rig = build_rig(scenario, world, last)
-    rng = scenario.rng("lidar")
-    latency = float(rng.uniform(0.001, 0.004) * rng.choice([-1.0, 1.0]))
-    exact = scenario.noiseless or scenario.calibrated
-    clock = LidarClock(0.0 if scenario.calibrated else latency, 0.0 if exact else 1e-4)
-    imu = Imu(scenario.imu_errors(), scenario.rng("imu"), rig.carrier.activity)
-    ranger = Ranger(
-        world,
-        rig,
-        scenario.range_errors(rig.head.lidar.noise),
-        rig.head.lidar.max_range,
-        _movers(scenario, world, rig, 0.5 * (first + last)),
-        rng,
-    )
-    receiver = None
-    if scenario.gnss is not None:
-        receiver = Receiver(scenario.gnss, scenario.rng("gnss"), rig.imu, scenario.noiseless)
-    sensors = Sensors(rig, ranger, imu, clock, _losses(scenario, first, last), rng, receiver)
-    return Setup(world, rig, sensors, first, last)
-
-
-def _movers(scenario: Scenario, world: World, rig: Rig, middle: float) -> list[Mover]:
-    movers: list[Mover] = [Airframe(rig.head.airframe, rig)]
-    if "person" in scenario.events:
-        near = rig.imu(np.array([middle])).p[0]
-        movers.append(Person(world, scenario.rng("person"), near))
-    return movers
-
-
-def _losses(scenario: Scenario, first: float, last: float) -> Losses:
-    at = first + 0.6 * (last - first)
-    gap = (at, at + GAP) if "gap" in scenario.events else None
-    return Losses(scenario.rng("losses"), gap, bursts="dropped-packets" in scenario.events)
-
-
-def simulate(
-    scenario: Scenario, out: Path, progress: Callable[[float], None] | None = None
-) -> SimulatedRecording:
-    """Write the recording, its `payload.yaml` and the truth into the folder `out`.
-
-    Parameters
-    ----------
-    progress : called with the simulated time in s, about once per simulated second
-
-    Raises
-    ------
-    UsageError
-        if `out` already holds a recording, or no flight of this duration is possible
-    """
-    return write_recording(prepare(scenario), scenario, out, progress)

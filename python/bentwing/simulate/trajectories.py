@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing.errors import UsageError
+from bentwing.base.errors import UsageError
 from bentwing.simulate.events import gust_shifts
 from bentwing.simulate.kinematics import Motion, translating
 from bentwing.simulate.planner import Tour, follow_route, plan_tour

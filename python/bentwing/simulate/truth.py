@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import yaml
 
-from bentwing.clock import format_ns
+from bentwing.base.clock import format_ns
 from bentwing.simulate.gnss import LEVER_ARM
 from bentwing.simulate.imu import ImuErrors
 from bentwing.simulate.kinematics import quats_xyzw
@@ -21,8 +21,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bentwing.simulate.rig import Rig
-    from bentwing.simulate.scenario import Scenario, Setup
+    from bentwing.simulate.scenario import Scenario
     from bentwing.simulate.scenes.mesh import Mesh
+    from bentwing.simulate.setup import Setup
 
     Array = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing.errors import UsageError
+from bentwing.base.errors import UsageError
 from bentwing.simulate.heads.rates import ornstein_uhlenbeck
 from bentwing.simulate.kinematics import Motion, translating
 from bentwing.simulate.planner import Tour, plan_tour

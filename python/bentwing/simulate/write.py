@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from bentwing.errors import UsageError
+from bentwing.base.errors import UsageError
 from bentwing.simulate.imu import RATE_HZ
 from bentwing.simulate.records import (
     CloudRecord,
@@ -34,7 +34,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from bentwing.simulate.rig import Rig
-    from bentwing.simulate.scenario import Scenario, Setup
+    from bentwing.simulate.scenario import Scenario
+    from bentwing.simulate.setup import Setup
 
 
 @dataclass(frozen=True, slots=True)

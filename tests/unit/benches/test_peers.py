@@ -10,9 +10,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bentwing import geometry
+from bentwing.base import geometry
+from bentwing.base.trajectory import Trajectory
 from bentwing.recording.payload import Encoder
-from bentwing.trajectory import Trajectory
 
 sys.path.append(str(Path(__file__).resolve().parents[3]))
 

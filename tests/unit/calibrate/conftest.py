@@ -6,10 +6,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bentwing import geometry
+from bentwing.base import geometry
+from bentwing.base.mount import Pose
 from bentwing.calibrate.motor_mount import turned
 from bentwing.calibrate.revolution import Revolutions, Stretch
-from bentwing.estimators.mount import Pose
 
 AXIS = np.array([0.0, 0.0, 1.0])
 NOMINAL = Pose(np.array([0.0, 0.0, -0.07]), np.array([0.0, np.sqrt(0.5), 0.0, np.sqrt(0.5)]))

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bentwing import geometry
+from bentwing.base import geometry
+from bentwing.base.errors import DivergedError, RecordingError
 from bentwing.calibrate.motor_mount import calibrate_motor
-from bentwing.errors import DivergedError, RecordingError
 
 ANGLE = st.floats(-0.02, 0.02)
 SHIFT = st.floats(-0.005, 0.005)

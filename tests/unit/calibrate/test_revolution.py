@@ -6,8 +6,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from bentwing.base.errors import NotEnoughDataError, RecordingError
 from bentwing.calibrate.revolution import Course, find_stretches
-from bentwing.errors import NotEnoughDataError, RecordingError
 from bentwing.recording import ImuBatch
 
 

@@ -6,9 +6,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bentwing import geometry
+from bentwing.base import geometry
+from bentwing.base.trajectory import Trajectory
 from bentwing.evaluate.alignment import Alignment
-from bentwing.trajectory import Trajectory
 
 
 @pytest.fixture(scope="session")

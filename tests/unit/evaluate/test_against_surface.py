@@ -2,8 +2,9 @@
 import numpy as np
 import pytest
 
-from bentwing import geometry
-from bentwing.errors import InputError
+from bentwing.base import geometry
+from bentwing.base.errors import InputError
+from bentwing.base.trajectory import Trajectory
 from bentwing.evaluate.against_surface import compare_with_map, read_reference
 from bentwing.evaluate.alignment import Alignment
 from bentwing.evaluate.clouds import Cloud
@@ -13,7 +14,6 @@ from bentwing.evaluate.surfels import Surfels, surfels_of_cloud, surfels_of_mesh
 from bentwing.map.chunk import MapChunk
 from bentwing.map.read_mesh import Mesh
 from bentwing.map.writer import open_map
-from bentwing.trajectory import Trajectory
 
 GEOGRAPHIC = np.array([512_345.0, 5_403_210.0, 230.0])
 

@@ -4,15 +4,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bentwing import geometry
-from bentwing.errors import InputError
+from bentwing.base import geometry
+from bentwing.base.errors import InputError
+from bentwing.base.trajectory import Trajectory
 from bentwing.evaluate.against_track import compare_with_track
 from bentwing.evaluate.alignment import Alignment
 from bentwing.evaluate.drift_boxes import drift_boxes
 from bentwing.evaluate.relative import rotational_error, translational_error
 from bentwing.evaluate.robust import fit_line
 from bentwing.evaluate.track import Track
-from bentwing.trajectory import Trajectory
 
 ORIGIN = 1_700_000_000_000_000_000
 

@@ -6,7 +6,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bentwing import geometry
+from bentwing.base import geometry
+from bentwing.base.trajectory import Trajectory
 from bentwing.evaluate.nees import (
     levelled_covariances,
     nees,
@@ -14,7 +15,6 @@ from bentwing.evaluate.nees import (
     pose_errors_from,
     pose_errors_since,
 )
-from bentwing.trajectory import Trajectory
 
 RNG = np.random.default_rng(3)
 

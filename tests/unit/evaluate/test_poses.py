@@ -6,10 +6,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bentwing import geometry
+from bentwing.base import geometry
+from bentwing.base.trajectory import Trajectory
 from bentwing.evaluate.density import wall_density
 from bentwing.evaluate.poses import pose_errors
-from bentwing.trajectory import Trajectory
 
 TIMES = np.linspace(0.0, 10.0, 101)
 

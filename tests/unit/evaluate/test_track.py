@@ -6,7 +6,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from bentwing.errors import InputError
+from bentwing.base.errors import InputError
 from bentwing.evaluate.track import bridges, read_track
 
 POSITIONS = "1700000000.25 1 2 3\n1700000000.5 2 3 4\n1700000001 4 5 6\n"

@@ -3,11 +3,11 @@ import numpy as np
 import pytest
 from evo.core import metrics, trajectory
 
-from bentwing import geometry
-from bentwing.errors import InputError
+from bentwing.base import geometry
+from bentwing.base.errors import InputError
+from bentwing.base.trajectory import Trajectory
 from bentwing.evaluate.alignment import Alignment, align
 from bentwing.evaluate.trajectory import absolute_error, drift
-from bentwing.trajectory import Trajectory
 
 MOVE = Alignment(
     geometry.to_matrices(geometry.exp(np.array([0.3, -0.2, 2.0]))), np.array([5.0, -3, 1])

@@ -8,7 +8,7 @@ import subprocess
 import numpy as np
 import pytest
 
-from bentwing.geodesy import ProjectedSystem
+from bentwing.base.geodesy import ProjectedSystem
 from bentwing.map.chunk import MapChunk
 from bentwing.map.gps_time import adjusted_gps_origin
 from bentwing.map.writer import open_map

@@ -2,13 +2,13 @@
 import numpy as np
 import pytest
 
-from bentwing import geometry
-from bentwing.estimators.interface import Calibration
-from bentwing.estimators.mount import FixedMount, MotorMount, Pose
+from bentwing.base import geometry
+from bentwing.base.calibration import Calibration
+from bentwing.base.mount import FixedMount, MotorMount, Pose
+from bentwing.base.trajectory import Trajectory
 from bentwing.map import project as room
 from bentwing.map.project import project
 from bentwing.recording.batches import ImuBatch, LidarBatch
-from bentwing.trajectory import Trajectory
 
 TARGET = np.array([4.0, 1.0, -0.5])
 R_IMU_LIDAR = geometry.exp(np.array([0.1, -0.4, 0.9]))

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from bentwing.errors import InputError, UsageError
+from bentwing.base.errors import InputError, UsageError
 from bentwing.map import read_rows
 from bentwing.map.chunk import MapChunk
 from bentwing.map.lzf import decompress_lzf

@@ -4,7 +4,7 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from bentwing.errors import UsageError
+from bentwing.base.errors import UsageError
 from bentwing.map.chunk import MapChunk
 from bentwing.map.sample import MapSample
 from bentwing.map.thin import VoxelSet, thin

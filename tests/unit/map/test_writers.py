@@ -9,8 +9,8 @@ import laspy
 import numpy as np
 import pytest
 
-from bentwing.errors import EstimationError, InputError, UsageError
-from bentwing.geodesy import ProjectedSystem
+from bentwing.base.errors import EstimationError, InputError, UsageError
+from bentwing.base.geodesy import ProjectedSystem
 from bentwing.map.chunk import MapChunk
 from bentwing.map.gps_time import adjusted_gps_origin
 from bentwing.map.read import read_points

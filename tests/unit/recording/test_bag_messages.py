@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from rosbags.rosbag1 import Reader, Writer
 
-from bentwing.recording.bag_messages import bag_messages
+from bentwing.recording.containers.bag_messages import bag_messages
 
 TYPE = "std_msgs/msg/String"
 COMPRESSIONS = [None, Writer.CompressionFormat.BZ2, Writer.CompressionFormat.LZ4]

@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 from rosbags.typesys import Stores, get_typestore
 
-from bentwing.clock import Clock
+from bentwing.base.clock import Clock
 from bentwing.recording.fixes import UNKNOWN_SIGMAS, read_fixes
 
 START_NS = 1_700_000_000_000_000_000

@@ -3,7 +3,7 @@
 
 import pytest
 
-from bentwing.errors import RecordingError
+from bentwing.base.errors import RecordingError
 from bentwing.recording.flights import flights_of
 
 

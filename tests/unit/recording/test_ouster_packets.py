@@ -10,7 +10,7 @@ import sys
 import numpy as np
 import pytest
 
-from bentwing.errors import PayloadError, RecordingError
+from bentwing.base.errors import PayloadError, RecordingError
 from bentwing.recording import ImuBatch, LidarBatch, Payload, Recording
 
 core = pytest.importorskip(

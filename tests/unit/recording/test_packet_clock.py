@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bentwing.recording.packet_clock import MAX_DRIFT, PacketClock, decide
+from bentwing.recording.packets.clock import MAX_DRIFT, PacketClock, decide
 
 S, HOUR = 10**9, 3600 * 10**9
 EPOCH = 1_700_000_000 * S

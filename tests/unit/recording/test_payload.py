@@ -4,7 +4,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bentwing.errors import PayloadError
+from bentwing.base.errors import PayloadError
 from bentwing.recording.payload import Payload
 
 EXAMPLE = """

@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import pytest
 
-from bentwing.errors import RecordingError
-from bentwing.recording.source import open_source
+from bentwing.base.errors import RecordingError
+from bentwing.recording.containers.source import open_source
 
 NS = 1_700_000_000 * 10**9
 

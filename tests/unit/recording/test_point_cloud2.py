@@ -7,8 +7,9 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from bentwing.recording import point_times, wire, wire_clouds
-from bentwing.recording.point_cloud2 import columns, sweep, time_field
+from bentwing.recording import point_times
+from bentwing.recording.messages import wire, wire_clouds
+from bentwing.recording.messages.point_cloud2 import columns, sweep, time_field
 
 STAMP_NS = 1_700_000_000_250_000_000
 LAYOUTS = {

@@ -8,11 +8,12 @@ import json
 import numpy as np
 import pytest
 
-from bentwing.errors import RecordingError
-from bentwing.pipeline import map_recording
-from bentwing.recording import ImuBatch, LidarBatch, Payload, Recording, point_cloud2, wire
-from bentwing.recording.source import open_source
-from bentwing.recording.wire_clouds import point_cloud
+from bentwing.base.errors import RecordingError
+from bentwing.recording import ImuBatch, LidarBatch, Payload, Recording
+from bentwing.recording.containers.source import open_source
+from bentwing.recording.messages import point_cloud2, wire
+from bentwing.recording.messages.wire_clouds import point_cloud
+from bentwing.run.pipeline import map_recording
 
 N_COLUMNS, N_BEAMS = 2048, 64
 LIDAR, IMU = "/os1_node/lidar_packets", "/os1_node/imu_packets"

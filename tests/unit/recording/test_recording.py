@@ -8,7 +8,7 @@ import itertools
 import numpy as np
 import pytest
 
-from bentwing.errors import PayloadError, RecordingError
+from bentwing.base.errors import PayloadError, RecordingError
 from bentwing.recording import EncoderBatch, ImuBatch, LidarBatch, Payload, Recording
 
 START_NS = 1_700_000_000 * 10**9

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from rosbags.rosbag1 import Writer
 
-from bentwing.errors import RecordingError
+from bentwing.base.errors import RecordingError
 from bentwing.recording import LidarBatch, Payload, Recording
 
 NO_IMU = Payload(imu=None)

@@ -5,7 +5,7 @@ from collections import Counter
 
 import pytest
 
-from bentwing.errors import RecordingError
+from bentwing.base.errors import RecordingError
 from bentwing.recording.stamps import StampMonitor
 
 S = 1_000_000_000

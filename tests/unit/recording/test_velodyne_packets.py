@@ -9,8 +9,8 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from bentwing.errors import RecordingError
-from bentwing.inspection import inspect
+from bentwing.base.errors import RecordingError
+from bentwing.calibrate.inspection import inspect
 from bentwing.recording import ImuBatch, LidarBatch, Payload, Recording
 
 pytest.importorskip("velodyne_decoder", reason='needs pip install "bentwing[packets]"')
@@ -328,7 +328,7 @@ def test_a_part_of_a_capture_is_read(tmp_path, packets):
 def test_the_points_are_the_same_however_packets_are_grouped(packets):
     import velodyne_decoder
 
-    from bentwing.recording.velodyne import VelodynePackets
+    from bentwing.recording.packets.velodyne import VelodynePackets
 
     turns = packets.vlp16_turns(0.05)
     data, times = [p for _, p in turns], np.array([t * 1e-6 for t, _ in turns])

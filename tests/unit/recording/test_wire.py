@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bentwing.recording import wire, wire_clouds, wire_scans
+from bentwing.recording.messages import wire, wire_clouds, wire_scans
 
 STAMP_NS = 1_700_000_000_250_000_000
 FRAMES = ["", "a", "ab", "abc", "laser", "base_link/front"]

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bentwing.base.trajectory import Trajectory
 from bentwing.report.colours import HEIGHT, colour
 from bentwing.report.picture import encode_png, project, render, render_top, write_png
 from bentwing.report.plot import Series, line_plot
@@ -15,7 +16,6 @@ from bentwing.report.svg import nice_ticks
 from bentwing.report.views import overhead_points
 from bentwing.report.wall import HEIGHT as HEIGHT_OF_PANEL
 from bentwing.report.wall import MEANS, draw_wall
-from bentwing.trajectory import Trajectory
 
 
 def decoded(png):

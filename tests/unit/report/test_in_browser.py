@@ -6,8 +6,8 @@ import shutil
 import numpy as np
 import pytest
 
+from bentwing.base.trajectory import Trajectory
 from bentwing.report.page import write_report
-from bentwing.trajectory import Trajectory
 
 sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
 CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")

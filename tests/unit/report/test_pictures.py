@@ -5,7 +5,7 @@ import zlib
 import numpy as np
 import pytest
 
-from bentwing.errors import UsageError
+from bentwing.base.errors import UsageError
 from bentwing.report.geotiff import write_geotiff
 from bentwing.report.lettering import bar_length, with_scale, write
 from bentwing.report.picture import View, project

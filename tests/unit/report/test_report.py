@@ -7,10 +7,10 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from bentwing import geometry
+from bentwing.base import geometry
+from bentwing.base.trajectory import Trajectory
 from bentwing.report import write_report
 from bentwing.report.calibration import calibration_table
-from bentwing.trajectory import Trajectory
 
 RECORD = {
     "complete": True,

@@ -6,10 +6,10 @@ import re
 import numpy as np
 import pytest
 
+from bentwing.base.trajectory import Trajectory
 from bentwing.report import scene as rooms
 from bentwing.report.scene import scene
 from bentwing.report.stretches import degenerate
-from bentwing.trajectory import Trajectory
 
 WINDOWS = [{"time": t, "degenerate": t == 3.0} for t in (1.0, 2.0, 3.0, 4.0)]
 

@@ -6,10 +6,11 @@ import time
 import numpy as np
 import pytest
 
-from bentwing import geometry
-from bentwing.estimators.kalman import KalmanSettings
+from bentwing.base import geometry
+from bentwing.base.progress import LineProgress
+from bentwing.base.trajectory import Trajectory
 from bentwing.evaluate.trajectory import angles
-from bentwing.progress import LineProgress
+from bentwing.odometry.kalman import KalmanSettings
 from bentwing.reproduce import fu2023, tazir2020
 from bentwing.reproduce.campaign import (
     Job,
@@ -21,10 +22,9 @@ from bentwing.reproduce.campaign import (
     with_first_pose,
 )
 from bentwing.reproduce.figure import Assignment, TextTable
-from bentwing.reproduce.tazir2020 import measure
+from bentwing.reproduce.tazir_measures import measure
 from bentwing.reproduce.tazir_walls import WALLS, scan_walls
 from bentwing.reproduce.trials import Flight, Trial
-from bentwing.trajectory import Trajectory
 
 NO_POINTS = np.zeros((0, 3), np.float32)
 

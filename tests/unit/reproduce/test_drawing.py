@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from bentwing import geometry
+from bentwing.base import geometry
+from bentwing.base.trajectory import Trajectory
 from bentwing.report.plot import Series, line_plot
 from bentwing.report.raster import rasterize
 from bentwing.report.views import oblique_view
 from bentwing.reproduce.drawing import angles_over, positions_over
-from bentwing.trajectory import Trajectory
 
 
 def picture(drawing):

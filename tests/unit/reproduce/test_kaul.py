@@ -5,7 +5,8 @@ import json
 
 import numpy as np
 
-from bentwing import geometry
+from bentwing.base import geometry
+from bentwing.base.trajectory import Trajectory
 from bentwing.evaluate.drift_boxes import DriftBoxes
 from bentwing.evaluate.evaluation import DriftOver, Evaluation
 from bentwing.evaluate.statistics import Box
@@ -13,7 +14,6 @@ from bentwing.reproduce import parts
 from bentwing.reproduce.figure import Assignment, Compared, Figure, Part
 from bentwing.reproduce.kaul_table import drift_rows
 from bentwing.reproduce.loop_stages import moved, with_drift
-from bentwing.trajectory import Trajectory
 
 
 def circle(n=400):

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from bentwing.simulate.records import CloudRecord, ScanRecord
-from bentwing.simulate.scenario import Scenario, prepare
+from bentwing.simulate.scenario import Scenario
+from bentwing.simulate.simulation import prepare
 
 WINDOW = (12.0, 13.0)
 """s, in flight."""

@@ -2,12 +2,13 @@
 import numpy as np
 import pytest
 
+from bentwing.simulate.beams import Beams
 from bentwing.simulate.events import GAP, LEAD, STALL, Losses, Person
 from bentwing.simulate.imu import ImuErrors
-from bentwing.simulate.ranging import Beams
 from bentwing.simulate.records import ImuRecord, ScanRecord
-from bentwing.simulate.scenario import Scenario, prepare
+from bentwing.simulate.scenario import Scenario
 from bentwing.simulate.scenes import SCENES, World
+from bentwing.simulate.simulation import prepare
 
 
 def prepared(*events, head="hokuyo-spin"):

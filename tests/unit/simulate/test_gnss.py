@@ -3,11 +3,11 @@ import numpy as np
 import pytest
 import yaml
 
-from bentwing.geodesy import LevelFrame
+from bentwing.base.geodesy import LevelFrame
+from bentwing.base.trajectory import read_tum
 from bentwing.recording import Payload, Recording
 from bentwing.simulate import Scenario, simulate
 from bentwing.simulate.gnss import LEVER_ARM
-from bentwing.trajectory import read_tum
 
 
 @pytest.fixture(scope="module", params=["bag", "mcap"])

@@ -2,7 +2,7 @@
 import numpy as np
 import pytest
 
-from bentwing.errors import UsageError
+from bentwing.base.errors import UsageError
 from bentwing.evaluate.alignment import align
 from bentwing.simulate.instruments import (
     TerrestrialErrors,
@@ -12,9 +12,10 @@ from bentwing.simulate.instruments import (
     track,
 )
 from bentwing.simulate.instruments.places import sees, standing_places
-from bentwing.simulate.scenario import Scenario, prepare
+from bentwing.simulate.scenario import Scenario
 from bentwing.simulate.scenes import Site, World
 from bentwing.simulate.scenes.mesh import box, merge
+from bentwing.simulate.simulation import prepare
 
 EXACT = TerrestrialErrors(bias=0.0, sigma=0.0, station_sigma=0.0, station_turn=0.0)
 STILL = TotalStation(sigma=0.0, measuring_time=0.0, clock_offset=1.5)

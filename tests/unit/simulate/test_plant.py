@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bentwing.control import SpinSettings
+from bentwing.flight.control import SpinSettings
 from bentwing.simulate.plant.airflow import ROTORS, Air, downdraft, induced
 from bentwing.simulate.plant.drives import FREE_RATE, STRAIGHT, held
 from bentwing.simulate.plant.flights import Drive, fly
@@ -17,7 +17,8 @@ from bentwing.simulate.plant.head import SpunHead, driving_force
 from bentwing.simulate.plant.outcomes import outcomes
 from bentwing.simulate.plant.parameters import Carrier, Flow, PlantSettings, Vanes
 from bentwing.simulate.plant.weather import Weather
-from bentwing.simulate.scenario import Scenario, prepare
+from bentwing.simulate.scenario import Scenario
+from bentwing.simulate.simulation import prepare
 
 CALM = Weather(max_wind=1e-9, max_mean=1e-9, max_speed=0.0, max_climb=0.0, max_descent=0.0)
 PLANNED = np.radians([150.0, 460.0])

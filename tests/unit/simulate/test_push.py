@@ -6,8 +6,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bentwing.control import BumperSettings
-from bentwing.control.bumper import GRAVITY
+from bentwing.flight.control import BumperSettings
+from bentwing.flight.control.bumper import GRAVITY
 from bentwing.simulate.push.quadrotor import Quadrotor, QuadrotorSettings
 from bentwing.simulate.push.runs import PushRun, run_push
 

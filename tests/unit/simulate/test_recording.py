@@ -10,8 +10,8 @@ from rosbags.typesys import Stores, get_typestore
 from typer import Typer
 from typer.testing import CliRunner
 
+from bentwing.base.errors import UsageError
 from bentwing.cli.simulate import simulate_command
-from bentwing.errors import UsageError
 from bentwing.simulate import Scenario, simulate
 
 ROS2 = get_typestore(Stores.ROS2_HUMBLE)

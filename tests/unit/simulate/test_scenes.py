@@ -4,10 +4,11 @@ import pytest
 
 from bentwing._core import Scene
 from bentwing.simulate.planner import follow_route, plan_tour
-from bentwing.simulate.scenario import Scenario, prepare
+from bentwing.simulate.scenario import Scenario
 from bentwing.simulate.scenes import SCENES, World
 from bentwing.simulate.scenes.mesh import ball, box, column, gable
 from bentwing.simulate.scenes.parts import car, facade, table
+from bentwing.simulate.simulation import prepare
 
 # Walls and dam are flown along a line.
 TOURED = sorted(set(SCENES) - {"walls", "dam"})

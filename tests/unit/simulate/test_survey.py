@@ -11,7 +11,7 @@ from bentwing.simulate import Scenario
 from bentwing.simulate.heads.joints import Mount
 from bentwing.simulate.heads.vlp16 import AXIS, ON_ITS_SIDE
 from bentwing.simulate.kinematics import rotation
-from bentwing.simulate.scenario import prepare
+from bentwing.simulate.simulation import prepare
 
 LEVER = 0.17  # m, a_bI
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing.errors import UsageError
+from bentwing.base.errors import UsageError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bentwing.simulate.beams import Beams
 from bentwing.simulate.lidars.interface import TRANSPORT, LidarClock
-from bentwing.simulate.ranging import Beams
 from bentwing.simulate.records import Record, ScanRecord
 
 if TYPE_CHECKING:

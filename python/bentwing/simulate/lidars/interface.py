@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from bentwing.simulate.ranging import Beams
+    from bentwing.simulate.beams import Beams
     from bentwing.simulate.records import Record
 
     Array = NDArray[np.float64]

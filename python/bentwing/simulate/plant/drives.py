@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from bentwing.control.spin_controller import SpinSettings
+from bentwing.flight.control.spin_controller import SpinSettings
 from bentwing.simulate.plant.flights import Drive
 from bentwing.simulate.plant.parameters import SINGLE_FLAP, PlantSettings
 

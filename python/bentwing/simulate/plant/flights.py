@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing.control.spin_controller import SpinSettings, spin_terms
+from bentwing.flight.control.spin_controller import SpinSettings, spin_terms
 from bentwing.simulate.plant.head import SpunHead
 from bentwing.simulate.plant.parameters import PlantSettings
 from bentwing.simulate.plant.weather import Conditions, Weather

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing.control.stall import LOST_AFTER, STALLED
+from bentwing.odometry.stall import LOST_AFTER, STALLED
 from bentwing.simulate.plant.flights import CONTROL_STEP
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing.control.spin_controller import SpinSettings, spin_terms
+from bentwing.flight.control.spin_controller import SpinSettings, spin_terms
 from bentwing.simulate.heads.rates import SPIN_STEP, ornstein_uhlenbeck
 from bentwing.simulate.plant.airflow import ROTORS, Air
 from bentwing.simulate.plant.flights import CONTROL_STEP, GYRO_NOISE, SUBSTEPS

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing.errors import UsageError
+from bentwing.base.errors import UsageError
 from bentwing.simulate.scenes import SCENES, Site, World
 from bentwing.simulate.scenes.mesh import box, merge, quad
 

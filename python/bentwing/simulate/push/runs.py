@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from bentwing.control import BumperSettings, VirtualBumper
+from bentwing.flight.control import BumperSettings, VirtualBumper
 from bentwing.simulate.heads.rates import ornstein_uhlenbeck
 from bentwing.simulate.push.places import PLACES, free_start, hull_clearance
 from bentwing.simulate.push.quadrotor import Quadrotor, QuadrotorSettings

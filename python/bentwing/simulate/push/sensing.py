@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing.control import CarrierState
+from bentwing.flight.control import CarrierState
 from bentwing.simulate.lidars.hokuyo import ANGLE_INCREMENT, ANGLE_MIN, N_BEAMS
 
 if TYPE_CHECKING:

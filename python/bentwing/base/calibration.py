@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""The slow states of a sensor head: clocks, mount, biases and gravity."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from bentwing.base.mount import Mount
+
+STANDARD_GRAVITY = 9.80665  # m/s²
+
+
+@dataclass(frozen=True, slots=True)
+class Calibration:
+    """The slow states at the end of the estimate, with their standard deviations.
+
+    Attributes
+    ----------
+    latency : s, lidar stamps minus IMU clock: a lidar stamp t was measured at t - latency
+    mount : where the lidar is, seen from the IMU
+    gyro_bias, accel_bias : (3,) rad/s, m/s²
+    gravity : (3,) m/s², map frame, pointing up
+    std : standard deviation of what was estimated, by the names `latency` (1,),
+        `extrinsic_rotation` (3,) rad and `extrinsic_translation` (3,) m of the lidar, or of the
+        motor, in the IMU frame, `gyro_bias` (3,), `accel_bias` (3,), `gravity` (2,) rad, and for
+        a motor `encoder_zero` (1,) rad, and of the lidar across the axis `motor_tilt` (2,) rad and
+        `motor_offset` (2,) m
+    """
+
+    latency: float
+    mount: Mount
+    gyro_bias: NDArray[np.float64]
+    accel_bias: NDArray[np.float64]
+    gravity: NDArray[np.float64]
+    std: dict[str, list[float]] = field(default_factory=dict)

@@ -1,0 +1,197 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""One pass over a recording, and what it lacks for mapping with how to repair it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bentwing.base.errors import RecordingError
+from bentwing.calibrate.inspection import fitness
+from bentwing.calibrate.inspection.fitness import Samples, Stretch
+from bentwing.calibrate.inspection.planar import ScanTurns
+from bentwing.calibrate.inspection.spin import Spin, spin_from_encoder, spin_from_gyro
+from bentwing.calibrate.inspection.structure import Structure, StructureMeter
+from bentwing.recording.batches import EncoderBatch, ImuBatch
+from bentwing.recording.containers.source import open_source
+from bentwing.recording.recording import Recording
+from bentwing.recording.topics import LASER_SCAN
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from bentwing.recording.containers.scanned import TopicInfo
+    from bentwing.recording.payload import Payload
+
+
+@dataclass(frozen=True, slots=True)
+class TopicReport:
+    """One topic; `role` is lidar, imu, encoder or empty, `gaps` are (start, length) in s."""
+
+    name: str
+    type: str
+    count: int
+    rate_hz: float
+    role: str = ""
+    gaps: list[tuple[float, float]] = field(default_factory=list)
+
+
+@dataclass(frozen=True, slots=True)
+class Inspection:
+    """What a recording holds and whether it can be mapped.
+
+    Attributes
+    ----------
+    paths : as given
+    start_ns, duration : ns UTC, s
+    topics : all of them
+    point_times : how the time of each point is known, None where it is not
+    spin : rate of turn over time, None without IMU and encoder
+    static_start : (start, end) s, None where the recording starts in motion or has no IMU
+    structure : what the lidar saw
+    counts : everything read and dropped
+    defects : what prevents mapping, each with how to repair it
+    warnings : what may make the map worse
+    """
+
+    paths: list[str]
+    start_ns: int
+    duration: float
+    topics: list[TopicReport]
+    point_times: str | None = None
+    spin: Spin | None = None
+    static_start: Stretch | None = None
+    structure: Structure | None = None
+    counts: dict[str, int] = field(default_factory=dict)
+    defects: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+
+    @property
+    def is_fit(self) -> bool:
+        """Whether nothing found prevents mapping."""
+        return not self.defects
+
+
+def inspect(paths: Path | str | Sequence[Path | str], payload: Payload | None = None) -> Inspection:
+    """Read a recording once and report on it.
+
+    Raises
+    ------
+    RecordingError
+        Nothing in it can be read at all; every lesser defect is part of the result.
+    """
+    listed = [Path(path) for path in ([paths] if isinstance(paths, (str, Path)) else paths)]
+    try:
+        with Recording(listed, payload, strict=False) as recording:
+            return _inspect_recording(recording, has_payload=payload is not None)
+    except RecordingError as error:
+        return _topics_only(listed, str(error))
+
+
+def _topics_only(paths: list[Path], defect: str) -> Inspection:
+    """Report on files whose sensors cannot be made out; raises where they cannot be opened."""
+    source = open_source(paths)
+    try:
+        duration = max(0, source.end_ns - source.start_ns) / 1e9
+        topics = [_topic_report(topic, duration) for topic in source.topics]
+        return Inspection(
+            [str(path) for path in paths],
+            source.start_ns,
+            duration,
+            topics,
+            defects=[defect],
+            warnings=list(source.warnings),
+        )
+    finally:
+        source.close()
+
+
+def _topic_report(
+    topic: TopicInfo,
+    duration: float,
+    role: str = "",
+    gaps: Sequence[tuple[float, float]] = (),
+) -> TopicReport:
+    # n messages span n - 1 periods.
+    rate_hz = max(0, topic.count - 1) / duration if duration > 0 else 0.0
+    return TopicReport(topic.name, topic.type, topic.count, rate_hz, role, list(gaps))
+
+
+def _inspect_recording(recording: Recording, *, has_payload: bool) -> Inspection:
+    samples, structure = _read(recording)
+    judgement = fitness.judge(recording, samples, has_payload=has_payload)
+    defects, warnings = list(judgement.defects), list(judgement.warnings)
+    if structure.n_points == 0:
+        defects.append(
+            f"{recording.lidar_topic}: no valid return at all; check that the lidar was not "
+            "covered and that it was switched on"
+        )
+    spin = None
+    if len(samples.encoder_times) > 1:
+        spin = spin_from_encoder(samples.encoder_times, samples.encoder_angles)
+    elif len(samples.imu_times) > 1:
+        spin = spin_from_gyro(samples.imu_times, judgement.gyro)
+    if spin is not None:
+        warnings += fitness.stall_warnings(spin)
+    roles = {
+        topic: role
+        for role, topic in (
+            ("lidar", recording.lidar_topic),
+            ("imu", recording.imu_topic),
+            ("encoder", recording.encoder_topic),
+        )
+        if topic is not None
+    }
+    gaps = recording.gaps
+    topics = [
+        _topic_report(
+            topic, recording.duration, roles.get(topic.name, ""), gaps.get(topic.name, ())
+        )
+        for topic in recording.topics
+    ]
+    return Inspection(
+        [str(path) for path in recording.paths],
+        recording.start_ns,
+        recording.duration,
+        topics,
+        recording.point_times,
+        spin,
+        judgement.static_start,
+        structure,
+        dict(recording.counts),
+        defects,
+        recording.warnings + warnings,
+    )
+
+
+def _read(recording: Recording) -> tuple[Samples, Structure]:
+    """Pass once over the recording, keeping the small streams whole and summing up the lidar's."""
+    imu: list[ImuBatch] = []
+    encoder: list[EncoderBatch] = []
+    meter = StructureMeter()
+    turns = _scan_turns(recording)
+    for batch in recording.batches():
+        if isinstance(batch, ImuBatch):
+            imu.append(batch)
+        elif isinstance(batch, EncoderBatch):
+            encoder.append(batch)
+        else:
+            meter.add(batch)
+            if turns is not None:
+                turns.add(batch)
+    samples = Samples.joined(imu, encoder, turns)
+    return samples, meter.result(recording.counts["lidar.returns"])
+
+
+def _scan_turns(recording: Recording) -> ScanTurns | None:
+    if recording.lidar_type != LASER_SCAN or recording.encoder_topic is not None:
+        return None
+    count = next(t.count for t in recording.topics if t.name == recording.lidar_topic)
+    period = recording.duration / max(1, count - 1)
+    has_beam_times = recording.point_times is not None
+    if has_beam_times and not np.isfinite(period):
+        return None
+    return ScanTurns(period if has_beam_times and period > 0 else None)

@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""From an estimate in its own frame to one on the Earth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bentwing.base.geodesy import ProjectedSystem
+from bentwing.closing.georeference.control_points import read_control_points
+from bentwing.closing.georeference.marks import Marks, summary
+from bentwing.closing.georeference.placement import (
+    Placement,
+    place,
+)
+from bentwing.closing.georeference.projection import MapProjection
+from bentwing.closing.georeference.site import Site
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Sequence
+
+    from numpy.typing import NDArray
+
+    from bentwing.base.trajectory import Trajectory
+    from bentwing.closing.georeference.settings import GeoreferenceSettings
+    from bentwing.map.chunk import MapChunk
+    from bentwing.recording.fixes import Fixes
+
+    Array = NDArray[np.float64]
+
+DOUBTFUL_HEADING_STD = np.radians(1.0)  # half a metre at the end of a lidar's reach
+_MEASURED = 5  # times that surfaces are found anew
+_BENT = 2
+
+
+@dataclass(frozen=True, slots=True)
+class Georeferenced:
+    """Where the map is.
+
+    Attributes
+    ----------
+    trajectory : in the map frame; another one than before only in the mode `constraints`
+    projection : to projected coordinates; None without GNSS, where the control points' own frame
+        stands for it
+    placement : of the map in that frame
+    record : for run.json
+    warnings : sentences
+    """
+
+    trajectory: Trajectory
+    projection: MapProjection | None
+    placement: Placement
+    record: dict[str, Any] = field(default_factory=dict)
+    warnings: list[str] = field(default_factory=list)
+
+    def to_projected(self, points: Array) -> Array:
+        """Coordinates (N, 3) m that are written, of map points (N, 3) m."""
+        if self.projection is None:
+            return self.placement.to_level(points)
+        return self.projection.to_projected(points)
+
+    @property
+    def crs_wkt(self) -> str | None:
+        """The coordinate reference system; None where it has no name."""
+        return None if self.projection is None else self.projection.system.wkt
+
+
+def georeference(
+    trajectory: Trajectory,
+    fixes: Fixes | None,
+    settings: GeoreferenceSettings,
+    *,
+    lever_arm: Sequence[float] = (0.0, 0.0, 0.0),
+    segments: Sequence[tuple[float, float]] = (),
+    reach: float = 100.0,
+    chunks: Callable[[], Iterable[MapChunk]] | None = None,
+) -> Georeferenced | None:
+    """Put a map on the Earth; None where there is nothing to do it with.
+
+    Parameters
+    ----------
+    trajectory : `T_map_imu`
+    fixes : of the GNSS receiver
+    settings : how they are used
+    lever_arm : (3,) m, antenna in the IMU frame
+    segments : first and last time of each stretch of the trajectory without a break, s
+    reach : m, how far from the trajectory there are points
+    chunks : gives the points of the map, needed with control points
+
+    Raises
+    ------
+    NotEnoughDataError
+        If heading and place do not follow from the data.
+    UsageError, InputError
+        If the projected system or the file of the control points cannot be used.
+    """
+    listed = read_control_points(settings.control_points) if settings.control_points else []
+    if settings.mode == "off" or (fixes is None and not listed):
+        return None
+    system = None if settings.epsg is None else ProjectedSystem.of_epsg(settings.epsg)
+    site = Site.of(trajectory, fixes, segments, lever_arm, system)
+    placement, used = site.first_placement()
+    marks: Marks | None = None
+    before: list[float | None] = []
+    slack = site.slack()
+    if listed and chunks is not None:
+        targets = site.targets_of(np.array([point.position for point in listed]))
+        marks = Marks.collect(listed, targets, placement, slack, chunks())
+        marks.measure(placement, slack)
+        before = marks.residuals(placement)
+        for i in range(_MEASURED):
+            surfaces, _ = marks.surfaces()
+            placement, used = place(site.positions, surfaces, placement)
+            marks.measure(placement, slack if i == 0 else min(slack, 0.1))
+    bent = trajectory
+    if settings.mode == "constraints":
+        for _ in range(_BENT):
+            bent = site.bent(bent, placement, used, marks)
+    return _finished(
+        site,
+        bent,
+        placement,
+        used=used,
+        reach=reach,
+        marks=marks,
+        before=before,
+        mode=settings.mode,
+    )
+
+
+def _finished(
+    site: Site,
+    trajectory: Trajectory,
+    placement: Placement,
+    *,
+    used: NDArray[np.bool_],
+    reach: float,
+    marks: Marks | None,
+    before: Sequence[float | None],
+    mode: str,
+) -> Georeferenced:
+    projection: MapProjection | None = None
+    record: dict[str, Any] = {"mode": mode}
+    if site.frame is not None and site.system is not None:
+        low = trajectory.positions.min(axis=0) - reach
+        high = trajectory.positions.max(axis=0) + reach
+        projection = MapProjection.over(low, high, site.frame, placement, site.system)
+        record |= projection.record()
+        gaps = placement.to_level(site.antenna(trajectory)[0]) - site.positions.targets
+        kept = gaps[used]
+        record["fixes"] = {
+            **site.counts,
+            "used": int(np.count_nonzero(used)),
+            "rejected": int(np.count_nonzero(~used)),
+            "rms_horizontal": float(np.sqrt(np.mean(np.sum(kept[:, :2] ** 2, axis=1)))),
+            "rms_vertical": float(np.sqrt(np.mean(kept[:, 2] ** 2))),
+        }
+    else:
+        zero = np.zeros(3)
+        linear = {"map": zero, "projected": placement.translation, "matrix": placement.rotation}
+        record |= {"heading": placement.heading, "linear": linear}
+    warnings = []
+    if placement.std[0] > DOUBTFUL_HEADING_STD:
+        warnings.append(
+            f"the heading of the map on the Earth is known to {np.degrees(placement.std[0]):.1f}° "
+            "only: fly a longer way, or give control points"
+        )
+    if marks is not None:
+        rows = marks.table(placement, before)
+        record["control_points"], record["residuals"] = rows, summary(rows)
+        missing = [row["id"] for row in rows if row["residual"] is None]
+        if missing:
+            warnings.append(
+                f"no flat surface was found within the radius of {', '.join(missing)}: these "
+                "control points are not used"
+            )
+    if trajectory is not site.original:
+        moved = np.linalg.norm(trajectory.positions - site.original.positions, axis=1)
+        record["bent_by"] = float(moved.max())
+    return Georeferenced(trajectory, projection, placement, record, warnings)

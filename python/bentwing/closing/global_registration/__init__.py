@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""Global non-rigid registration: a recording corrected by everything it saw more than once."""
+
+from __future__ import annotations
+
+from bentwing.closing.global_registration.budget import Budget
+from bentwing.closing.global_registration.closing import (
+    Closed,
+    Recorded,
+    Registered,
+    close_loops,
+    register_jointly,
+)
+from bentwing.closing.global_registration.fixed import STAMP
+from bentwing.closing.global_registration.settings import GlobalSettings
+from bentwing.closing.global_registration.stretches import Collector, Inertial, Stretches
+
+__all__ = [
+    "STAMP",
+    "Budget",
+    "Closed",
+    "Collector",
+    "GlobalSettings",
+    "Inertial",
+    "Recorded",
+    "Registered",
+    "Stretches",
+    "close_loops",
+    "register_jointly",
+]

@@ -1,0 +1,241 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""From an estimate and its recording to the estimate that agrees with itself everywhere."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from bentwing import _core
+from bentwing.base.errors import EstimationError
+from bentwing.base.mount import MotorMount
+from bentwing.closing.global_registration.biases import drift_of, has_inertial_states
+from bentwing.closing.global_registration.budget import HELD, Budget
+from bentwing.closing.global_registration.fixed import fixed_piece
+from bentwing.closing.global_registration.matching import MatchingPlan
+from bentwing.closing.global_registration.outcome import closed_estimate, improved, record_of
+from bentwing.closing.global_registration.settings import GlobalSettings
+from bentwing.closing.global_registration.stretches import (
+    Inertial,
+    Stretches,
+    collect,
+    interval_of,
+    length_of,
+)
+from bentwing.odometry.continuous.core_settings import CoreSettings
+from bentwing.odometry.continuous.slow_states import SLICES, SlowStatePrior
+from bentwing.odometry.core_states import core_globals, core_samples
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from bentwing.base.estimate import Estimate
+    from bentwing.recording import Batch, Payload
+
+
+@dataclass(frozen=True, slots=True)
+class Closed:
+    """What became of an estimate.
+
+    Attributes
+    ----------
+    estimate : corrected, or as it was where that failed
+    record : what was done, for run.json
+    """
+
+    estimate: Estimate
+    record: dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Recorded:
+    """An estimate with what was measured along it.
+
+    Attributes
+    ----------
+    segments : the trajectory of each, where it is now, with the surfels that were seen along it
+    """
+
+    estimate: Estimate
+    payload: Payload
+    segments: list[Stretches]
+    inertial: Inertial
+
+
+@dataclass(frozen=True, slots=True)
+class Registered:
+    """What became of several estimates.
+
+    Attributes
+    ----------
+    estimates : corrected, or as they were where that failed
+    record : what was done, for run.json
+    failure : why nothing was corrected; None if it was
+    """
+
+    estimates: list[Estimate]
+    record: dict[str, Any]
+    failure: str | None = None
+
+
+def close_loops(
+    estimate: Estimate,
+    batches: Iterable[Batch],
+    payload: Payload,
+    *,
+    settings: GlobalSettings | None = None,
+    budget: Budget | None = None,
+    known: _core.Surfels | None = None,
+    threads: int | None = None,
+) -> Closed:
+    """Correct an estimate by everything its recording saw more than once (Kaul 2015, section 2.2).
+
+    Parameters
+    ----------
+    estimate : of any estimator
+    batches : of the recording, as the estimator got them
+    budget : what may be held; default: that of the settings for the length of the estimate
+    known : surfels of a map that is already right: the estimate, which must lie within reach of the
+        matches, comes to it, and it does not move
+    threads : default: all cores
+
+    Returns
+    -------
+    The corrected estimate, or the one given, with a warning, where the correction cannot be trusted.
+    """
+    settings = settings or GlobalSettings()
+    budget = budget or Budget.of(length_of(estimate), settings)
+    started = time.perf_counter()
+    segments, inertial = collect(
+        batches,
+        estimate,
+        length=settings.stretch,
+        settings=settings.surfels.model_copy(update={"max_rate": budget.rate}),
+        range_sigma=payload.lidar.range_sigma,
+        threads=threads or 0,
+    )
+    collected = time.perf_counter() - started
+    recorded = Recorded(estimate, payload, segments, inertial)
+    found = register_jointly(
+        [recorded], settings=settings, budget=budget, known=known, threads=threads
+    )
+    if "timings" in found.record:
+        found.record["timings"] = {"surfels": collected, **found.record["timings"]}
+    (closed,) = found.estimates
+    if found.failure is not None:
+        what = "the loops were not closed, the trajectory is open-loop"
+        if known is not None:
+            what = (
+                "the trajectory was not registered with the map, its places alone say where it is"
+            )
+        sentence = f"{what}: {found.failure}"
+        closed = replace(closed, warnings=[*closed.warnings, sentence])
+    return Closed(closed, found.record)
+
+
+def register_jointly(
+    recorded: Sequence[Recorded],
+    *,
+    settings: GlobalSettings | None = None,
+    budget: Budget | None = None,
+    known: _core.Surfels | None = None,
+    threads: int | None = None,
+) -> Registered:
+    """Correct estimates by everything that any of them saw more than once (Kaul 2015, section 2.2).
+
+    Parameters
+    ----------
+    recorded : roughly aligned with each other; the first one defines the map
+    budget : what may be held; default: that of the settings for all of them together
+    known : as of `close_loops`; where there are any they define the map
+    threads : default: all cores
+    """
+    settings = settings or GlobalSettings()
+    seconds = sum(length_of(r.estimate) for r in recorded)
+    budget = budget or Budget.of(seconds, settings)
+    estimates = [r.estimate for r in recorded]
+    record: dict[str, Any] = {"applied": False, "budget": budget}
+    if not any(s.surfels for r in recorded for s in r.segments):
+        return _failed(estimates, record, "there are no points along the trajectory")
+    started = time.perf_counter()
+    fixed = [] if known is None else [fixed_piece(known)]
+    try:
+        found = _core.register_globally(
+            [*fixed, *(_piece(s, r) for r in recorded for s in r.segments)],
+            settings=CoreSettings.of(
+                settings.registration(budget.seconds),
+                _cautious([r.payload for r in recorded]),
+                max(interval_of(e) for e in estimates),
+            ),
+            plan=MatchingPlan(settings.n_visits, settings.min_overlap, HELD),
+            threads=threads or 0,
+        )
+    except EstimationError as error:
+        return _failed(estimates, record, str(error))
+    timings = {"register": time.perf_counter() - started}
+    trajectories = [s.trajectory for r in recorded for s in r.segments]
+    record.update(record_of(found, trajectories, found.samples[len(fixed) :], timings))
+    why = improved(found)
+    if why:
+        return _failed(estimates, record, why)
+    record["applied"] = True
+    closed, first = [], len(fixed)
+    for r in recorded:
+        own = slice(first, first + len(r.segments))
+        closed.append(closed_estimate(r.estimate, found, [s.trajectory for s in r.segments], own))
+        first = own.stop
+    return Registered(closed, record)
+
+
+def _failed(estimates: list[Estimate], record: dict[str, Any], why: str) -> Registered:
+    record["reason"] = why
+    return Registered(estimates, record, why)
+
+
+def _cautious(payloads: Sequence[Payload]) -> Payload:
+    """Return the first payload with the largest noise of all, as rows of all have one weight."""
+    first = payloads[0]
+    sigma = max(p.lidar.range_sigma for p in payloads)
+    update: dict[str, Any] = {"lidar": first.lidar.model_copy(update={"range_sigma": sigma})}
+    imus = [p.imu for p in payloads if p.imu is not None]
+    if imus:
+        noises = {
+            name: max(getattr(imu, name) for imu in imus) for name in ("gyro_noise", "accel_noise")
+        }
+        update["imu"] = imus[0].model_copy(update=noises)
+    return first.model_copy(update=update)
+
+
+def _piece(stretches: Stretches, recorded: Recorded) -> _core.Piece:
+    estimate, inertial, payload = recorded.estimate, recorded.inertial, recorded.payload
+    used = has_inertial_states(estimate) and payload.imu is not None and len(inertial.times) > 0
+    # The map is level, and stays so: gravity is where it belongs, the trajectory may tilt.
+    known = [name for name in SLICES if name not in estimate.calibration.std]
+    prior = SlowStatePrior(
+        payload.imu if used else None,
+        has_motor=isinstance(estimate.calibration.mount, MotorMount),
+        moving=True,
+        frozen={*known, "gravity"},
+    )
+    return _core.Piece(
+        core_samples(stretches.trajectory),
+        stretches.surfels,
+        _steadied(stretches, inertial, estimate) if used else None,
+        core_globals(estimate.calibration),
+        information=prior.information,
+        offset=prior.offset,
+        frozen=prior.frozen.tolist(),
+    )
+
+
+def _steadied(stretches: Stretches, inertial: Inertial, estimate: Estimate) -> _core.Imu:
+    """Inertial samples around a segment with the biases of the calibration all the time."""
+    times = stretches.trajectory.times
+    kept = (inertial.times > times[0] - 0.2) & (inertial.times < times[-1] + 0.2)
+    at = inertial.times[kept]
+    return _core.Imu(
+        at,
+        inertial.gyro[kept] - drift_of(estimate, "gyro_bias", at),
+        inertial.accel[kept] - drift_of(estimate, "accel_bias", at),
+    )

@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""What a global registration says, as an `Estimate` and as a record."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bentwing.base import geometry
+from bentwing.base.trajectory import Trajectory
+from bentwing.closing.global_registration.stretches import interval_of
+from bentwing.odometry.continuous.slow_states import named_std
+from bentwing.odometry.core_states import refined_mount
+from bentwing.odometry.segments import joined
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from bentwing import _core
+    from bentwing.base.estimate import Estimate
+
+# So much smaller may the share of inliers become by chance.
+TOLERATED_LOSS = 0.01
+
+
+def improved(found: _core.GlobalRegistration) -> str:
+    """Return why a result cannot be trusted, or nothing."""
+    if not any(i[0] for i in found.iterations):
+        return "no surface was seen twice"
+    if not found.converged:
+        turn, shift = found.iterations[-1][4:]
+        return (
+            f"the global registration did not settle in {len(found.iterations)} iterations; the "
+            f"last one moved the trajectory by {1e3 * shift:.1f} mm and {np.degrees(turn):.3f}°"
+        )
+    before, after = found.iterations[0][2], found.fit[0]
+    if after < before - TOLERATED_LOSS:
+        return (
+            f"of the matches {before:.1%} fitted before the global registration and {after:.1%} "
+            "after it"
+        )
+    return ""
+
+
+def closed_estimate(
+    estimate: Estimate,
+    found: _core.GlobalRegistration,
+    segments: Sequence[Trajectory],
+    own: slice,
+) -> Estimate:
+    """Return the estimate with corrected segments and calibration.
+
+    Parameters
+    ----------
+    segments : of the estimate, as they were registered
+    own : which pieces of the result they are
+    """
+    dt = interval_of(estimate)
+    moved = [
+        Trajectory(s.times, np.asarray(n.positions), np.asarray(n.quats_xyzw))
+        for s, n in zip(segments, found.samples[own], strict=True)
+    ]
+    # Each segment has found a calibration of its own; the longest one knows it best.
+    best = int(np.argmax([s.times[-1] - s.times[0] for s in moved]))
+    slow, covariance = found.globals[own][best], found.covariances[own][best]
+    frozen = np.diag(covariance) == 0.0
+    calibration = replace(
+        estimate.calibration,
+        latency=slow.latency,
+        mount=refined_mount(estimate.calibration.mount, slow),
+        gyro_bias=slow.gyro_bias,
+        accel_bias=slow.accel_bias,
+        std={**estimate.calibration.std, **named_std(covariance, frozen)},
+    )
+    return replace(estimate, trajectory=joined(moved, dt), calibration=calibration)
+
+
+def record_of(
+    found: _core.GlobalRegistration,
+    segments: Sequence[Trajectory],
+    corrected: Sequence[_core.Samples],
+    timings: dict[str, float],
+) -> dict[str, Any]:
+    """Return what was done, for run.json; lengths in m, angles in rad, times in s."""
+    n_unknowns, n_links, n_far_links, n_surfels = found.counts
+    names = (
+        "n_matches",
+        "n_far_matches",
+        "inlier_share",
+        "residual_rms",
+        "rotation",
+        "translation",
+    )
+    pairs = list(zip(segments, corrected, strict=True))
+    shifts = [np.linalg.norm(n.positions - s.positions, axis=1).max() for s, n in pairs]
+    turns = [_turns(s.quats_xyzw, n.quats_xyzw).max() for s, n in pairs]
+    return {
+        "n_unknowns": n_unknowns,
+        "n_stretch_pairs": n_links,
+        "n_revisits": n_far_links,
+        "n_surfels": n_surfels,
+        "converged": found.converged,
+        "iterations": [dict(zip(names, i, strict=True)) for i in found.iterations],
+        "inlier_share": found.fit[0],
+        "residual_rms": found.fit[1],
+        "largest_translation": float(max(shifts)),
+        "largest_rotation": float(max(turns)),
+        "timings": timings,
+    }
+
+
+def _turns(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    turn = geometry.log(geometry.multiply(after, geometry.inverse(before)))
+    return np.asarray(np.linalg.norm(turn, axis=1))

@@ -1,0 +1,185 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""Goes through a recording once more: surfels of its stretches, and its inertial samples."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bentwing import _core
+from bentwing.odometry.core_states import core_globals, core_samples
+from bentwing.recording import ImuBatch, LidarBatch
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from numpy.typing import NDArray
+
+    from bentwing.base.estimate import Estimate
+    from bentwing.base.trajectory import Trajectory
+    from bentwing.odometry.continuous.settings import SurfelSettings
+    from bentwing.recording import Batch
+
+
+@dataclass(slots=True)
+class Stretches:
+    """What was seen along a segment of the trajectory.
+
+    Attributes
+    ----------
+    trajectory : the segment
+    surfels : of consecutive stretches, in order of time
+    """
+
+    trajectory: Trajectory
+    surfels: list[_core.Surfels] = field(default_factory=list)
+
+
+@dataclass(frozen=True, slots=True)
+class Inertial:
+    """All inertial samples: `times` (M,), `gyro` and `accel` (M, 3); units as in `ImuBatch`."""
+
+    times: NDArray[np.float64]
+    gyro: NDArray[np.float64]
+    accel: NDArray[np.float64]
+
+
+def segments_of(estimate: Estimate) -> list[Trajectory]:
+    """Return the stretches of the trajectory without a break that are long enough to be moved."""
+    whole = estimate.trajectory
+    spans = estimate.segments or [(float(whole.times[0]), float(whole.times[-1]))]
+    cut = [whole.within([span]) for span in spans]
+    return [t for t in cut if len(t.times) > 1]
+
+
+def length_of(estimate: Estimate) -> float:
+    """Return the length of all segments together, s."""
+    return sum(float(t.times[-1] - t.times[0]) for t in segments_of(estimate))
+
+
+def interval_of(estimate: Estimate) -> float:
+    """Return the time between two poses, s."""
+    times = estimate.trajectory.times
+    return float(times[-1] - times[0]) / (len(times) - 1)
+
+
+def collect(
+    batches: Iterable[Batch],
+    estimate: Estimate,
+    *,
+    length: float,
+    settings: SurfelSettings,
+    range_sigma: float,
+    threads: int,
+) -> tuple[list[Stretches], Inertial]:
+    """Make the surfels of all segments, with the poses and the calibration of the estimate.
+
+    Parameters
+    ----------
+    batches : of the recording the estimate is of
+    length : of a stretch, s
+    """
+    collector = Collector(
+        estimate, length=length, settings=settings, range_sigma=range_sigma, threads=threads
+    )
+    for batch in batches:
+        collector.add(batch)
+    return collector.result()
+
+
+class Collector:
+    """The same, batch by batch as they come; parameters as of `collect`."""
+
+    def __init__(
+        self,
+        estimate: Estimate,
+        *,
+        length: float,
+        settings: SurfelSettings,
+        range_sigma: float,
+        threads: int,
+    ) -> None:
+        self._maker = _Maker(estimate, length, settings, range_sigma, threads)
+        self._inertial: list[ImuBatch] = []
+
+    def add(self, batch: Batch) -> None:
+        """Take the next batch of the recording."""
+        if isinstance(batch, ImuBatch):
+            self._inertial.append(batch)
+        elif isinstance(batch, LidarBatch) and len(batch.times):
+            self._maker.add(batch)
+
+    def result(self) -> tuple[list[Stretches], Inertial]:
+        """Finish with what was added."""
+        self._maker.finish()
+        return self._maker.found, _joined(self._inertial)
+
+
+class _Maker:
+    """Cuts the points into stretches of a length and turns each into surfels."""
+
+    def __init__(
+        self,
+        estimate: Estimate,
+        length: float,
+        settings: SurfelSettings,
+        range_sigma: float,
+        threads: int,
+    ) -> None:
+        segments = segments_of(estimate)
+        self.found = [Stretches(t) for t in segments]
+        self._samples = [core_samples(t) for t in segments]
+        self._slow = core_globals(estimate.calibration)
+        self._latency = estimate.calibration.latency
+        self._length, self._settings, self._threads = length, settings, threads
+        self._range_sigma = range_sigma
+        self._number = 0
+        self._held: list[LidarBatch] = []
+
+    def add(self, batch: LidarBatch) -> None:
+        """Take the next points; those outside the segments are passed over."""
+        times = batch.times - self._latency
+        while self._number < len(self.found):
+            span = self.found[self._number].trajectory.times
+            inside = (times >= span[0]) & (times <= span[-1])
+            if inside.any():
+                self._hold(batch if inside.all() else batch.where(inside))
+            if times[-1] <= span[-1]:
+                return
+            self.finish()
+            self._number += 1
+
+    def _hold(self, batch: LidarBatch) -> None:
+        self._held.append(batch)
+        if batch.times[-1] - self._held[0].times[0] >= self._length:
+            self.finish()
+
+    def finish(self) -> None:
+        """Make the surfels of what is held."""
+        if not self._held:
+            return
+        held, self._held = self._held, []
+        angles = [b.angles for b in held if b.angles is not None]
+        surfels = _core.extract_surfels(
+            np.ascontiguousarray(np.concatenate([b.points for b in held])),
+            np.concatenate([b.times for b in held]),
+            np.concatenate(angles) if len(angles) == len(held) else None,
+            self._samples[self._number],
+            self._slow,
+            settings=self._settings,
+            range_sigma=self._range_sigma,
+            threads=self._threads,
+        )
+        self.found[self._number].surfels.append(surfels)
+
+
+def _joined(batches: list[ImuBatch]) -> Inertial:
+    if not batches:
+        return Inertial(np.empty(0), np.empty((0, 3)), np.empty((0, 3)))
+    return Inertial(
+        np.concatenate([b.times for b in batches]),
+        np.concatenate([b.gyro for b in batches]),
+        np.concatenate([b.accel for b in batches]),
+    )

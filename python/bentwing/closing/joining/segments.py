@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""The segments of one recording, between which it was cut, put together again by what they saw."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from bentwing.base.trajectory import DT
+from bentwing.closing.global_registration import Budget, Closed, GlobalSettings, register_jointly
+from bentwing.closing.global_registration.stretches import Stretches, length_of
+from bentwing.closing.joining.describe import describe_matches, describe_parts_of
+from bentwing.closing.joining.matches import Match, Part, connected, find_matches, parts_of
+from bentwing.closing.joining.placing import place_groups
+from bentwing.closing.joining.survey import survey
+from bentwing.odometry.segments import GUESSED, joined
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from bentwing.base.estimate import Estimate
+    from bentwing.recording import Batch, Payload
+
+NAME = "recording"
+
+
+def close_segments(
+    estimate: Estimate,
+    batches: Iterable[Batch],
+    payload: Payload,
+    *,
+    budget: Budget | None = None,
+    threads: int | None = None,
+) -> tuple[Closed, dict[str, Any]]:
+    """Find the segments of an estimate in each other, and correct all of them as one.
+
+    A segment that shares no place with the others stays where the estimate has guessed it.
+
+    Parameters
+    ----------
+    estimate : with more than one segment
+    batches : of the recording, as the estimator got them
+    budget : what may be held
+
+    Returns
+    -------
+    closed : the estimate, and what its registration did
+    record : which places were compared, for run.json
+
+    Raises
+    ------
+    EstimationError
+        If the segments' pose graph cannot be solved.
+    """
+    budget = budget or Budget.of(length_of(estimate), GlobalSettings())
+    found = survey(NAME, estimate, batches, payload, surfel_rate=budget.rate, threads=threads)
+    parts = parts_of([found])
+    trajectories = {
+        Part(0, s): stretches.trajectory for s, stretches in enumerate(found.recorded.segments)
+    }
+    groups, matches = place_groups(trajectories, parts, find_matches(parts))
+    placed = {part: t for group in groups for part, t in group.trajectories.items()}
+    segments = [
+        Stretches(placed[Part(0, s)], stretches.surfels)
+        for s, stretches in enumerate(found.recorded.segments)
+    ]
+    together = connected(parts, matches)
+    moved = replace(
+        estimate,
+        trajectory=joined([s.trajectory for s in segments], DT),
+        warnings=_warnings(estimate.warnings, together, matches),
+    )
+    recorded = replace(found.recorded, estimate=moved, segments=segments)
+    result = register_jointly([recorded], budget=budget, threads=threads)
+    (closed,) = result.estimates
+    if result.failure is not None:
+        sentence = f"the segments were not registered with each other: {result.failure}"
+        closed = replace(closed, warnings=[*closed.warnings, sentence])
+    record = {
+        "parts": describe_parts_of([NAME], parts),
+        "candidates": describe_matches([NAME], matches),
+        "groups": [[part.segment for part in group] for group in together],
+        "graphs": [group.record for group in groups],
+    }
+    return Closed(closed, result.record), record
+
+
+def _warnings(
+    sentences: Sequence[str], together: Sequence[Sequence[Part]], matches: Sequence[Match]
+) -> list[str]:
+    """Say of each break what is known now of the segments on its two sides."""
+    group_of = {part.segment: number for number, group in enumerate(together) for part in group}
+    told, boundary = [], 0
+    for sentence in sentences:
+        if GUESSED not in sentence:
+            told.append(sentence)
+            continue
+        before, after = group_of.get(boundary), group_of.get(boundary + 1)
+        boundary += 1
+        if before is None or before != after:
+            told.append(f"{sentence}: no place was found that both sides have seen")
+            continue
+        n = sum(m.believed for m in matches)
+        told.append(
+            sentence.replace(
+                GUESSED,
+                f"its place relative to what came before was found again by {n} places that more than "
+                "one segment has seen",
+            )
+        )
+    return told

@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""From an estimate in its own frame to the estimate in a map's, by places."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from bentwing.base.errors import EstimationError
+from bentwing.closing.localize.placement import place_in_map
+from bentwing.closing.places import PartStream, describe_parts, match_places
+from bentwing.map.project import project
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from bentwing.base.estimate import Estimate
+    from bentwing.closing.localize.prior_map import PriorMap
+    from bentwing.closing.places import Candidate, Place
+    from bentwing.map.chunk import MapChunk
+    from bentwing.recording import Batch
+
+
+@dataclass(frozen=True, slots=True)
+class Localized:
+    """An estimate where it is in a map, to within reach of the registration.
+
+    Attributes
+    ----------
+    estimate : in the map's frame
+    record : how it came there, for run.json
+    """
+
+    estimate: Estimate
+    record: dict[str, Any]
+
+
+def find_in_map(
+    estimate: Estimate,
+    batches: Iterable[Batch],
+    prior: PriorMap,
+    *,
+    threads: int | None = None,
+) -> Localized:
+    """Find a recording in a map without a guess where it is.
+
+    Parameters
+    ----------
+    estimate : open-loop, in its own frame
+    batches : of the recording it is of
+
+    Raises
+    ------
+    NotInMapError
+        If no place was recognized.
+    """
+    chunks = project(
+        batches,
+        estimate.trajectory,
+        estimate.calibration,
+        segments=estimate.segments,
+        threads=threads,
+    )
+    places = _described(chunks, estimate)
+    candidates = match_places(prior.places, places)
+    record: dict[str, Any] = {
+        "map": str(prior.path),
+        "map_points": prior.n_points,
+        "map_places": len(prior.places),
+        "places": len(places),
+        "candidates": [_candidate(c, places) for c in candidates],
+    }
+    placement = place_in_map(estimate, candidates, places)
+    if placement is None:
+        msg = (
+            f"{prior.path}: none of the {len(places)} places of the recording was recognized among "
+            f"the {len(prior.places)} of the map; run.json says why under localization. Is it the same "
+            "site, seen from near enough, and is the map level?"
+        )
+        raise NotInMapError(msg, record)
+    record["supporters"] = placement.supporters
+    record["T_map_run"] = placement.T_map_run.tolist()
+    record["largest_deformation"] = placement.largest_deformation
+    return Localized(placement.estimate, record)
+
+
+class NotInMapError(EstimationError):
+    """No place of the recording was recognized in the map; `record` tells what was tried."""
+
+    def __init__(self, message: str, record: dict[str, Any]) -> None:
+        super().__init__(message)
+        self.record = record
+
+
+def _described(chunks: Iterable[MapChunk], estimate: Estimate) -> list[Place]:
+    """Describe the places of a stream of points, one place at a time."""
+    poses = estimate.trajectory
+    spans = estimate.segments or [(float(poses.times[0]), float(poses.times[-1]))]
+    stream, places = PartStream(poses, spans), list[Any]()
+    for chunk in chunks:
+        places += describe_parts(stream.add(chunk.points, chunk.times))
+    return [*places, *describe_parts(stream.finish())]
+
+
+def _candidate(candidate: Candidate, places: Sequence[Place]) -> dict[str, Any]:
+    agreement = candidate.agreement
+    return {
+        "map_place": candidate.i,
+        "span": places[candidate.j].span,
+        "votes": candidate.votes,
+        "accepted": candidate.accepted,
+        "reason": candidate.reason,
+        "n_inliers": candidate.n_inliers,
+        "overlap": None if agreement is None else agreement.overlap,
+        "agreement": None if agreement is None else agreement.agreement,
+    }

@@ -1,0 +1,341 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""Odometry while the sensors deliver: batches in at any time, the pose now and the map so far out."""
+
+from __future__ import annotations
+
+import weakref
+from collections import Counter
+from functools import partial
+from threading import Lock
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bentwing.base.errors import UsageError
+from bentwing.flight.control import StallWatch
+from bentwing.flight.live.backlog import Backlog
+from bentwing.flight.live.engine import create_engine, estimate_at, new_data
+from bentwing.flight.live.inputs import InputOrder
+from bentwing.flight.live.live_map import LiveMap, MapUpdate
+from bentwing.flight.live.prediction import StampedPose, past_pose
+from bentwing.flight.live.state import LiveState, Registered
+from bentwing.flight.live.status import Status, status_of
+from bentwing.flight.live.worker import Worker
+from bentwing.recording import EncoderBatch, ImuBatch, LidarBatch, Payload
+from bentwing.recording.preprocess import Preprocessing
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from numpy.typing import ArrayLike, NDArray
+    from typing_extensions import Self
+
+    from bentwing.base.estimate import Estimate
+    from bentwing.base.trajectory import Trajectory
+    from bentwing.flight.control import Stall
+    from bentwing.odometry.continuous.settings import ContinuousSettings
+    from bentwing.odometry.kalman import KalmanSettings
+    from bentwing.recording import Batch
+
+
+class Odometry:
+    """Odometry and map while the sensors deliver.
+
+    Feed what comes, from any thread; windows are registered in a thread of the object's own, and
+    `pose` never waits for it. All times are seconds since one start of your choice, near the first
+    sample: subtract it from the stamps while they are integers. Points carry the lidar's stamps,
+    everything else the IMU's; the latency between both is estimated.
+
+    Parameters
+    ----------
+    payload : the sensor head, or the payload.yaml that describes it
+    estimator : `continuous`, or `kalman`: a 3D lidar and an IMU, the pose corrected ten times a second
+    settings : of the estimator; default: as `map_recording`
+    threads : for one registration; default: all cores
+    map_spacing : m, edge of the voxels that keep one point of the map each
+    max_map_points : the map never holds more, at 20 bytes each: `map_spacing` doubles instead
+    max_lag : s that registration may be late; points are thinned out before, and counted
+    usual_rate : rad/s at which the head is held or commanded; with it `stall` tells when it stands
+    """
+
+    def __init__(
+        self,
+        payload: Payload | Path | str,
+        *,
+        estimator: str = "continuous",
+        settings: ContinuousSettings | KalmanSettings | None = None,
+        threads: int | None = None,
+        map_spacing: float = 0.1,
+        max_map_points: int = 5_000_000,
+        max_lag: float = 10.0,
+        usual_rate: float | None = None,
+    ) -> None:
+        if not (np.isfinite(map_spacing) and map_spacing > 0):
+            msg = f"map_spacing: expected a length above zero, got {map_spacing} m"
+            raise UsageError(msg)
+        if max_map_points < 1 or not max_lag > 0:
+            msg = f"max_map_points and max_lag: expected above zero, got {max_map_points}, {max_lag} s"
+            raise UsageError(msg)
+        head = payload if isinstance(payload, Payload) else Payload.load(payload)
+        self._payload = head
+        self._spin = None if usual_rate is None else StallWatch(usual_rate)
+        self._backlog = Backlog(max_lag)
+        self._dropped: Counter[str] = Counter({"live.points_dropped": 0})
+        self._filtered: Counter[str] = Counter()
+        self._order = InputOrder()
+        self._feeding = Lock()
+        self._state = LiveState()
+        self._engine = create_engine(estimator, head, settings, threads)
+        self._shift = new_data(self._engine)
+        self._final: Estimate | None = None
+        self._cached: tuple[Registered, Estimate] | None = None
+        self._newest_point = -np.inf
+        self._worker = Worker(
+            self._engine,
+            Preprocessing(head, self._filtered),
+            self._state,
+            partial(LiveMap, map_spacing, max_map_points, threads or 0),
+        )
+        # Not a method of this object, which could then never be collected.
+        self._stop = weakref.finalize(self, self._worker.stop)
+
+    def add_imu(self, times: ArrayLike, gyro: ArrayLike, accel: ArrayLike) -> None:
+        """Take inertial samples, one or many.
+
+        Parameters
+        ----------
+        times : (M,) or a number, s, IMU clock, not before what was added last
+        gyro : (M, 3) or (3,), rad/s, imu frame
+        accel : (M, 3) or (3,), m/s², imu frame (specific force: +g upwards at rest)
+
+        Raises
+        ------
+        ValueError
+            If the batch cannot be used; nothing of it is taken.
+        """
+        with self._feeding:
+            batch = self._order.imu(times, gyro, accel)
+            if self._payload.imu is None or self._state.began_without_imu:
+                msg = (
+                    f"IMU batch at {batch.times[:1]} s: the estimate goes without inertial samples; "
+                    "describe the IMU in the payload, and feed it before the points' first six seconds"
+                )
+                raise ValueError(msg)
+            self._take(batch)
+
+    def add_points(
+        self, points: ArrayLike, times: ArrayLike, rings: ArrayLike | None = None
+    ) -> None:
+        """Take returns of the lidar, a scan or less.
+
+        Parameters
+        ----------
+        points : (N, 3), m, lidar frame
+        times : (N,), s, lidar clock, non-decreasing, not before what was added last
+        rings : (N,), beam numbers of a multi-beam lidar, for `kalman`, which is better with them
+
+        Raises
+        ------
+        ValueError
+            If the batch cannot be used; nothing of it is taken.
+        """
+        with self._feeding:
+            self._take(self._order.points(points, times, rings))
+
+    def add_encoder(self, times: ArrayLike, angles: ArrayLike) -> None:
+        """Take angles of the motor that turns the lidar, one or many.
+
+        Parameters
+        ----------
+        times : (K,) or a number, s, lidar clock, not before what was added last
+        angles : (K,) or a number, rad, unwrapped (continuous over full turns)
+
+        Raises
+        ------
+        ValueError
+            If the batch cannot be used; nothing of it is taken.
+        """
+        with self._feeding:
+            self._take(self._order.encoder(times, angles))
+
+    def feed(self, batch: Batch) -> None:
+        """Take a batch as a `Recording` streams it, to replay one."""
+        if isinstance(batch, LidarBatch):
+            self.add_points(batch.points, batch.times, batch.ring)
+        elif isinstance(batch, ImuBatch):
+            self.add_imu(batch.times, batch.gyro, batch.accel)
+        else:
+            self.add_encoder(batch.times, batch.angles)
+
+    def pose(self, at: float | None = None) -> StampedPose:
+        """Return the pose of the IMU in the map; takes well below a millisecond.
+
+        From the last registered window on, the IMU carries it with the biases and the gravity
+        estimated there; when a window is registered, the next pose takes its correction at once.
+
+        Parameters
+        ----------
+        at : s, IMU clock; default: the newest inertial sample (without an IMU: the newest point)
+
+        Raises
+        ------
+        NotEnoughDataError
+            While the start is waited for.
+        ValueError
+            If `at` is before the first pose, or beyond the newest data by more than 0.1 s.
+        EstimationError
+            If the estimate has failed.
+        """
+        self._worker.require_health()
+        at = None if at is None else float(at)
+        pose = self._state.pose(at, self._newest_point)
+        if pose is None and at is not None:
+            pose = past_pose(self.trajectory, at)
+        assert pose is not None  # of None the newest is returned
+        return pose
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """What is registered so far, at 100 Hz; `Trajectory.write_tum` writes it."""
+        return self.estimate().trajectory
+
+    def estimate(self) -> Estimate:
+        """Return what is registered so far: trajectory, calibration, records of the windows.
+
+        Raises
+        ------
+        NotEnoughDataError
+            While the start is waited for.
+        """
+        if self._final is not None:
+            return self._final
+        registered, cached = self._state.require(), self._cached
+        if cached is None or cached[0] is not registered:
+            cached = registered, estimate_at(self._engine, registered.done)
+            self._cached = cached
+        return cached[1]
+
+    def map_points(self) -> NDArray[np.float32]:
+        """Return the map so far (N, 3), m, map frame: one point per voxel.
+
+        A point stays where the first registration of its window put it, some millimetres from where
+        later windows would; `bentwing.map_recording` makes the map of record.
+        """
+        newest = self._state.newest
+        return np.empty((0, 3), np.float32) if newest is None else newest.cloud.points()
+
+    def new_points(self) -> MapUpdate:
+        """Return what has come to the map since the last call."""
+        newest = self._state.newest
+        if newest is None:
+            return MapUpdate(np.empty((0, 3), np.float32), replaces=False)
+        return newest.cloud.update()
+
+    @property
+    def status(self) -> Status:
+        """How far the estimate can be relied upon.
+
+        `waiting` for the end of the rest, or for the six seconds in which it is looked for: no pose
+        yet. `initializing`: poses, but latency, mount and biases are still being learned.
+        `tracking`. `degenerate`: the surfaces of the last window leave a direction unseen, the IMU
+        carries it. `coasting`: there was no window for longer than two shifts, the lidar is silent or
+        registration too slow; the IMU alone carries the pose. `failed`: feeding and reading raise why.
+        """
+        if self._worker.error is not None:
+            return "failed"
+        age = self._state.age(self._newest_point)
+        return status_of(self._state.newest, age, self._shift)
+
+    @property
+    def stall(self) -> Stall | None:
+        """The stall of the head that lasts, with a warning for the pilot; None while it turns.
+
+        Seen by the encoder, or without one by an IMU that turns with the head, as soon as they are
+        fed: no registration is waited for. What a long stall may cut is two maps then, see `Estimate`.
+
+        Raises
+        ------
+        UsageError
+            Without `usual_rate`.
+        """
+        if self._spin is None:
+            msg = "a stall is told from the usual rate: Odometry(..., usual_rate=...) in rad/s"
+            raise UsageError(msg)
+        return self._spin.stall
+
+    def surfel_normals(self) -> NDArray[np.float64]:
+        """Return the normals (N, 3), map frame, of what the last window has seen, for `SpinTarget`."""
+        newest = self._state.newest
+        return np.empty((0, 3)) if newest is None else newest.done.normals()
+
+    @property
+    def health(self) -> dict[str, Any] | None:
+        """The record of the last window, as in `Estimate.windows`; None while waiting."""
+        newest = self._state.newest
+        return None if newest is None else dict(newest.done.windows[-1])
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Points dropped for lack of time (`live.points_dropped`) and by the payload's filters."""
+        return {**self._dropped, **self._filtered}
+
+    def wait(self, timeout: float | None = None) -> bool:
+        """Wait until everything fed is registered as far as it can be, as a replay wants to.
+
+        Returns
+        -------
+        bool
+            Whether it is, within `timeout` seconds.
+        """
+        return self._worker.wait(timeout)
+
+    def finish(self) -> Estimate:
+        """Register the rest, close, and return what `map_recording` would estimate from the same.
+
+        Raises
+        ------
+        EstimationError
+            If nothing could be estimated, or the estimate has failed.
+        """
+        if self._final is None:
+            self._worker.finish()
+            self._final = self._engine.result()
+        self.close()
+        return self._final
+
+    def close(self) -> None:
+        """End the thread; what was estimated can still be read."""
+        self._stop()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _take(self, batch: Batch) -> None:
+        if not len(batch.times):
+            return
+        if isinstance(batch, LidarBatch) and not self._has_time(batch):
+            self._dropped["live.points_dropped"] += len(batch.times)
+        else:
+            self._worker.put(batch)
+        self._order.accept(batch)
+        self._watch_spin(batch)
+        if isinstance(batch, ImuBatch):
+            self._state.add_imu(batch)
+        elif isinstance(batch, LidarBatch):
+            self._newest_point = float(batch.times[-1])
+
+    def _watch_spin(self, batch: Batch) -> None:
+        if self._spin is None:
+            return
+        if isinstance(batch, EncoderBatch):
+            self._spin.add_encoder(batch.times, batch.angles)
+        elif isinstance(batch, ImuBatch) and self._payload.encoder is None:
+            self._spin.add_gyro(batch.times, batch.gyro)
+
+    def _has_time(self, batch: LidarBatch) -> bool:
+        self._worker.require_health()
+        newest, end = self._state.newest, float(batch.times[-1])
+        return newest is None or self._backlog.has_time(end, newest.done.end, self._shift)

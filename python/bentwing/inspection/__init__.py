@@ -1,6 +1,0 @@
-# SPDX-License-Identifier: MIT OR Apache-2.0
-"""Whether a recording is fit for mapping: what it holds, what it lacks, how to repair that."""
-
-from bentwing.inspection.inspect import Inspection, inspect
-
-__all__ = ["Inspection", "inspect"]

@@ -1,0 +1,208 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""The slow states of the continuous estimator: their places, priors and carried information."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bentwing.base import geometry
+from bentwing.base.calibration import STANDARD_GRAVITY
+from bentwing.base.errors import UsageError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from numpy.typing import NDArray
+
+    from bentwing.recording.payload import Imu
+
+N_STATES = 20
+# Order of the core's `registration::index`.
+SLICES = {
+    "latency": slice(0, 1),
+    "extrinsic_rotation": slice(1, 4),
+    "extrinsic_translation": slice(4, 7),
+    "gyro_bias": slice(7, 10),
+    "accel_bias": slice(10, 13),
+    "gravity": slice(13, 15),
+    "encoder_zero": slice(15, 16),
+    "motor_tilt": slice(16, 18),
+    "motor_offset": slice(18, 20),
+}
+MOTOR_STATES = ("encoder_zero", "motor_tilt", "motor_offset")
+
+# Standard deviations before anything was measured: s, rad, m, rad/s, m/s², rad, rad, rad, m.
+INITIAL_STD = {
+    "latency": 3e-3,
+    "extrinsic_rotation": 9e-3,
+    "extrinsic_translation": 5e-3,
+    "gyro_bias": 2.5e-4,
+    "accel_bias": 0.04,
+    "gravity": 0.02,
+    "encoder_zero": 9e-3,
+    "motor_tilt": 9e-3,
+    "motor_offset": 3e-3,
+}
+MOVING_START_STD = {"gyro_bias": 0.01, "accel_bias": 0.05, "gravity": 0.2}
+# Random walks, per √s: clocks drift, mounts give way and warm up. In ten minutes 0.25 ms, 0.006° and
+# half a millimetre: no model is right to less.
+WALK = {
+    "latency": 1e-5,
+    "extrinsic_rotation": 4e-6,
+    "extrinsic_translation": 2e-5,
+    "accel_bias": 3e-4,
+}
+
+# A carrier may still settle when it seems to rest, m/s².
+MIN_REST_STD = 2e-3
+
+# The matches of a surface share its noise and its curvature: so large a share of what a window says
+# of the slow states counts. Measured: with it errors are about as large as stated.
+MATCH_INDEPENDENCE = 0.4
+
+
+def initial_std(*, moving: bool) -> dict[str, float]:
+    """Return the standard deviations before anything was measured, at rest or in motion."""
+    return INITIAL_STD | (MOVING_START_STD if moving else {})
+
+
+class SlowStatePrior:
+    """What is known of the slow states, carried from window to window.
+
+    Each second is seen by several windows, so a share of what a window says is carried, and the
+    mean follows by that share only: a prior re-centred on each window's estimate would let weakly
+    observable directions walk.
+    """
+
+    def __init__(
+        self, imu: Imu | None, *, has_motor: bool, moving: bool, frozen: Iterable[str]
+    ) -> None:
+        names = _frozen_names(frozen, has_imu=imu is not None, has_motor=has_motor)
+        std = initial_std(moving=moving)
+        self.frozen = np.zeros(N_STATES, dtype=bool)
+        self._information = np.zeros((N_STATES, N_STATES))
+        self._offset = np.zeros(N_STATES)
+        self._walk = np.zeros(N_STATES)
+        walk = WALK if imu is None else WALK | {"gyro_bias": imu.gyro_bias_walk}
+        for name, place in SLICES.items():
+            index = np.arange(N_STATES)[place]
+            self.frozen[place] = name in names
+            self._information[index, index] = std[name] ** -2
+            self._walk[place] = walk.get(name, 0.0) ** 2
+
+    @property
+    def information(self) -> NDArray[np.float64]:
+        """(20, 20) information about the prior's mean."""
+        return self._information
+
+    @property
+    def offset(self) -> list[float]:
+        """Correction (20,) that leads from the prior's mean to the current values."""
+        return self._offset.tolist()
+
+    def reset(self, name: str, std: float | NDArray[np.float64]) -> None:
+        """Replace what is known of one state by independent standard deviations about its value.
+
+        What is known of the other states stays what it is when nothing is known of this one.
+        """
+        index = np.arange(N_STATES)[SLICES[name]]
+        others = np.setdiff1d(np.arange(N_STATES), index)
+        covariance = np.linalg.inv(self._information)
+        self._information[:] = 0.0
+        rest = np.ix_(others, others)
+        self._information[rest] = np.linalg.inv(covariance[rest])
+        self._information[index, index] = np.asarray(std) ** -2.0
+        self._offset[index] = 0.0
+
+    def observe_rest(self, quat_xyzw: NDArray[np.float64], std: NDArray[np.float64]) -> None:
+        """Take the current accelerometer bias and gravity to add up to the force at rest.
+
+        At rest only their horizontal sum is known: a bias looks like a tilt. Along gravity its
+        magnitude, which is not estimated, adds to the error.
+
+        Parameters
+        ----------
+        quat_xyzw : (4,) attitude at rest
+        std : (3,) m/s², of the mean force at rest
+        """
+        to_map = geometry.to_matrices(quat_xyzw[None])[0]
+        rows = np.zeros((2, N_STATES))
+        rows[:, SLICES["accel_bias"]] = to_map[:2]
+        # Turning gravity about x moves its y component down, about y its x component up.
+        rows[:, SLICES["gravity"]] = STANDARD_GRAVITY * np.array([[0.0, 1.0], [-1.0, 0.0]])
+        sigma = max(MIN_REST_STD, float(np.linalg.norm(std)))
+        before = self._information.copy()
+        self._information += rows.T @ rows / sigma**2
+        self._offset[:] = np.linalg.solve(self._information, before @ self._offset)
+
+    def discounted(self, covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the covariance (20, 20) after a window as it is if matches depend on each other."""
+        active = ~self.frozen
+        honest = np.zeros_like(covariance)
+        if active.any():
+            block = np.ix_(active, active)
+            gained = self._gained(covariance, block)
+            honest[block] = np.linalg.inv(self._information[block] + MATCH_INDEPENDENCE * gained)
+        return honest
+
+    def carry(
+        self,
+        covariance: NDArray[np.float64],
+        offset: Sequence[float],
+        shift: float,
+        window: float,
+    ) -> None:
+        """Forget by the random walks over `shift` seconds, and add what a window has gained.
+
+        Parameters
+        ----------
+        covariance : (20, 20) of the slow states after the window, prior included
+        offset : (20,) correction that leads from the prior's mean to the window's estimate
+        shift, window : s
+        """
+        active = ~self.frozen
+        if not active.any():
+            return
+        block = np.ix_(active, active)
+        before, gained = self._information[block], self._gained(covariance, block)
+        diffused = np.linalg.inv(before) + np.diag(self._walk[active] * shift)
+        share = MATCH_INDEPENDENCE * shift / window
+        after = np.linalg.inv(diffused) + share * gained
+        self._information[block] = 0.5 * (after + after.T)
+        # The window alone says x_w, with gained (x_w - mean) = (before + gained) (estimate - mean).
+        estimate = np.asarray(offset)[active]
+        pull = share * (before + gained) @ estimate
+        self._offset[active] = estimate - np.linalg.solve(after, pull)
+
+    def _gained(
+        self, covariance: NDArray[np.float64], block: tuple[NDArray[np.intp], ...]
+    ) -> NDArray[np.float64]:
+        """Information of a window without that of its prior."""
+        return _positive_part(np.linalg.inv(covariance[block]) - self._information[block])
+
+
+def named_std(covariance: NDArray[np.float64], frozen: NDArray[np.bool_]) -> dict[str, list[float]]:
+    """Return the standard deviations of the states that are estimated, by name."""
+    std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    return {name: std[s].tolist() for name, s in SLICES.items() if not frozen[s].all()}
+
+
+def _frozen_names(frozen: Iterable[str], *, has_imu: bool, has_motor: bool) -> set[str]:
+    names = set(frozen)
+    unknown = names - SLICES.keys()
+    if unknown:
+        msg = f"frozen: unknown states {sorted(unknown)}; choose from {list(SLICES)}"
+        raise UsageError(msg)
+    if not has_imu:
+        names |= SLICES.keys() - set(MOTOR_STATES)
+    if not has_motor:
+        names |= set(MOTOR_STATES)
+    return names
+
+
+def _positive_part(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Drop directions of negative information, which only rounding makes."""
+    values, vectors = np.linalg.eigh(0.5 * (matrix + matrix.T))
+    return np.asarray((vectors * np.maximum(values, 0.0)) @ vectors.T)

@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""Calibrations and trajectories as the compiled core takes and returns them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bentwing import _core
+from bentwing.base.mount import FixedMount, MotorMount, Mount, Pose
+
+if TYPE_CHECKING:
+    from bentwing.base.calibration import Calibration
+    from bentwing.base.trajectory import Trajectory
+
+# Stamps written to the nanosecond are this uniform, s; a missing sample is not.
+UNIFORM_WITHIN = 1e-4
+
+
+def core_globals(calibration: Calibration) -> _core.Globals:
+    """Return the slow states of a calibration."""
+    mount = calibration.mount
+    if isinstance(mount, FixedMount):
+        return _core.Globals(
+            _pair(mount.T_imu_lidar),
+            latency=calibration.latency,
+            gyro_bias=calibration.gyro_bias,
+            accel_bias=calibration.accel_bias,
+            gravity=calibration.gravity,
+        )
+    return _core.Globals(
+        _pair(mount.T_imu_motor),
+        latency=calibration.latency,
+        gyro_bias=calibration.gyro_bias,
+        accel_bias=calibration.accel_bias,
+        gravity=calibration.gravity,
+        motor_axis=mount.axis,
+        encoder_zero=mount.encoder_zero,
+        T_motor_lidar=_pair(mount.T_motor_lidar),
+    )
+
+
+def refined_mount(described: Mount, slow: _core.Globals) -> Mount:
+    """Return the mount with the transforms of the slow states; a motor keeps its axis."""
+    base = Pose(slow.base_translation, slow.base_quat_xyzw)
+    translation, quat = slow.motor_lidar_translation, slow.motor_lidar_quat_xyzw
+    if isinstance(described, FixedMount) or translation is None or quat is None:
+        return FixedMount(base)
+    return MotorMount(base, described.axis, slow.encoder_zero, Pose(translation, quat))
+
+
+def core_samples(trajectory: Trajectory) -> _core.Samples:
+    """Return the samples of a trajectory.
+
+    Raises
+    ------
+    ValueError
+        If the trajectory has fewer than two poses or not the same time between all of them.
+    """
+    times = trajectory.times
+    if len(times) < 2:
+        msg = f"trajectory: expected at least two poses, got {len(times)}"
+        raise ValueError(msg)
+    uniform = np.linspace(times[0], times[-1], len(times))
+    off = np.abs(times - uniform)
+    if off.max() > UNIFORM_WITHIN:
+        worst = int(np.argmax(off))
+        msg = (
+            "trajectory: expected the same time between all poses, "
+            f"but pose {worst} is {off[worst]:.4f} s off; resample it"
+        )
+        raise ValueError(msg)
+    return _core.Samples(
+        float(times[0]),
+        float((times[-1] - times[0]) / (len(times) - 1)),
+        np.ascontiguousarray(trajectory.positions),
+        np.ascontiguousarray(trajectory.quats_xyzw),
+    )
+
+
+def _pair(pose: Pose) -> tuple[list[float], list[float]]:
+    return pose.translation.tolist(), pose.quat_xyzw.tolist()

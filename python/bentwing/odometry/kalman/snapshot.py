@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""A run of the filter as it is after a sweep: what others may read while the filter goes on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bentwing import _core
+from bentwing.base import geometry
+from bentwing.base.trajectory import DT, Trajectory
+from bentwing.odometry.core_states import core_globals
+from bentwing.odometry.start import levelling
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from bentwing.base.calibration import Calibration
+
+    Poses = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
+
+# Sweeps whose poses are handed on at once: a second of them.
+N_RECENT = 10
+
+
+@dataclass(frozen=True)
+class FilterSnapshot:
+    """What a run of the filter has found, level; everything is a copy or is never changed.
+
+    Attributes
+    ----------
+    start, end : s, of the lidar data used
+    gravity : (3,) m/s², as the filter has it, by which the poses are levelled
+    calibration : the slow states
+    windows : records of the sweeps
+    poses : of the sweeps, not levelled
+    blind, seconds : without inertial samples, and of work
+    is_settling : whether it is a rehearsal
+    """
+
+    start: float
+    end: float
+    gravity: NDArray[np.float64]
+    calibration: Calibration
+    windows: list[dict[str, Any]]
+    poses: list[Poses]
+    blind: float
+    seconds: float
+    is_settling: bool
+
+    def snapshot(self) -> FilterSnapshot:
+        """Return itself."""
+        return self
+
+    def trajectory(self) -> Trajectory:
+        """Return all poses, 100 a second."""
+        return self._levelled(self.poses)
+
+    def recent(self) -> Trajectory:
+        """Return the poses of the last second."""
+        return self._levelled(self.poses[-N_RECENT:])
+
+    def level(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return points (N, 3) that `samples` has placed, which is level already."""
+        return points
+
+    def normals(self) -> NDArray[np.float64]:
+        """Return no normals (0, 3): the filter keeps none."""
+        return np.empty((0, 3))
+
+    @cached_property
+    def samples(self) -> _core.Samples:
+        """The recent poses, to place points by."""
+        recent = self.recent()
+        return _core.Samples(
+            float(recent.times[0]), DT, recent.positions.copy(), recent.quats_xyzw.copy()
+        )
+
+    @cached_property
+    def globals(self) -> _core.Globals:
+        """The slow states, gravity vertical."""
+        return core_globals(self.calibration)
+
+    def _levelled(self, parts: list[Poses]) -> Trajectory:
+        trajectory, turn = joined_poses(parts), levelling(self.gravity)
+        return Trajectory(
+            trajectory.times,
+            geometry.rotate(turn, trajectory.positions),
+            geometry.multiply(turn, trajectory.quats_xyzw),
+        )
+
+
+def joined_poses(parts: list[Poses]) -> Trajectory:
+    """Return the poses of consecutive sweeps as one trajectory."""
+    if not parts:
+        return Trajectory(np.zeros(0), np.zeros((0, 3)), np.zeros((0, 4)))
+    times, positions, quats = zip(*parts, strict=True)
+    return Trajectory(np.concatenate(times), np.concatenate(positions), np.concatenate(quats))

@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""The calibration that a payload describes: where every estimator begins."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bentwing.base.calibration import STANDARD_GRAVITY, Calibration
+from bentwing.base.mount import FixedMount, MotorMount, Pose
+
+if TYPE_CHECKING:
+    from bentwing.base.mount import Mount
+    from bentwing.recording.payload import Payload, Transform
+
+
+def described_mount(payload: Payload) -> Mount:
+    """Return the mount as the payload describes it; without a description the frames coincide."""
+    encoder = payload.encoder
+    if encoder is None:
+        return FixedMount(_pose(payload.T_imu_lidar))
+    return MotorMount(
+        T_imu_motor=_pose(encoder.T_imu_motor),
+        axis=np.array(encoder.axis),
+        encoder_zero=0.0,
+        T_motor_lidar=_pose(encoder.T_motor_lidar),
+    )
+
+
+def described_calibration(payload: Payload) -> Calibration:
+    """Return latency and mount as the payload describes them, without biases, gravity along z."""
+    return Calibration(
+        latency=payload.lidar.latency,
+        mount=described_mount(payload),
+        gyro_bias=np.zeros(3),
+        accel_bias=np.zeros(3),
+        gravity=np.array([0.0, 0.0, STANDARD_GRAVITY]),
+    )
+
+
+def _pose(transform: Transform | None) -> Pose:
+    if transform is None:
+        return Pose.identity()
+    return Pose(np.array(transform.translation), np.array(transform.quaternion))

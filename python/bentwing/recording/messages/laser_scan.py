@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""Scans of a 2D lidar → points in its scan plane (z = 0) with a time per beam."""
+
+from __future__ import annotations
+
+import functools
+import itertools
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bentwing.recording.batches import LidarBatch
+
+if TYPE_CHECKING:
+    from collections import Counter
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from bentwing.recording.messages.wire_scans import RawScan
+
+MAX_SWEEP = 10.0  # s; a longer scan is a damaged time_increment
+
+
+def has_beam_times(scan: RawScan) -> bool:
+    """Whether the time of each beam is known: `stamp + i * time_increment`."""
+    return scan.time_increment != 0.0 or len(scan.ranges) < 2
+
+
+def is_sane(scan: RawScan) -> bool:
+    """Whether angles and times can be computed with; damaged messages fail here."""
+    numbers = (scan.angle_min, scan.angle_increment, scan.time_increment)
+    duration = abs(scan.time_increment) * len(scan.ranges)
+    return all(map(math.isfinite, numbers)) and duration < MAX_SWEEP
+
+
+def points_of_scans(
+    scans: Sequence[RawScan], starts: NDArray[np.float64], counts: Counter[str]
+) -> list[LidarBatch]:
+    """Return the valid returns of consecutive scans, one batch per run of equal geometry.
+
+    Parameters
+    ----------
+    scans : all `is_sane`
+    starts : (S,) s, time of each scan's first beam
+    counts : receives `returns` (all beams), `nan`, `inf`, `zero`, `out_of_range`
+    """
+    batches = []
+    pairs = zip(scans, starts.tolist(), strict=True)
+    for _, run in itertools.groupby(pairs, key=lambda pair: _geometry(pair[0])):
+        members, times = zip(*run, strict=True)
+        batches.append(_points_of_run(members, np.array(times), counts))
+    return batches
+
+
+def _geometry(scan: RawScan) -> tuple[float | int | bool, ...]:
+    return (*scan[1:4], *scan[5:7], len(scan.ranges), scan.intensities is None)
+
+
+def _points_of_run(
+    scans: Sequence[RawScan], starts: NDArray[np.float64], counts: Counter[str]
+) -> LidarBatch:
+    head = scans[0]
+    shape = len(scans), len(head.ranges)
+    ranges = _joined([scan.ranges for scan in scans]).reshape(shape)
+    keep = _valid(ranges, head.range_min, head.range_max, counts)
+    # All beams are placed and the valid ones taken: that is cheaper than to find each one's angle.
+    distances = np.where(keep, ranges, 0).astype(np.float64)
+    cosines, sines = _directions(head.angle_min, head.angle_increment, shape[1])
+    points = np.zeros((*shape, 3))
+    np.multiply(cosines, distances, out=points[..., 0])
+    np.multiply(sines, distances, out=points[..., 1])
+    times = starts[:, None] + np.arange(shape[1]) * head.time_increment
+    intensity = None
+    if head.intensities is not None:
+        intensity = _joined([s.intensities for s in scans if s.intensities is not None])
+    return LidarBatch(points.reshape(-1, 3), times.ravel(), intensity).where(keep.ravel())
+
+
+def _valid(
+    ranges: NDArray[np.float32], low: float, high: float, counts: Counter[str]
+) -> NDArray[np.bool_]:
+    """Return which ranges are returns, and count why the others are not."""
+    # Some drivers leave the limits at zero; NaN limits compare false and keep nothing.
+    within = (ranges >= low) & (ranges <= high) if high > 0 else ranges > 0
+    keep = within & (ranges != 0) & np.isfinite(ranges)
+    masks = {"nan": np.isnan(ranges), "inf": np.isinf(ranges), "zero": ranges == 0}
+    unusable = {reason: int(np.count_nonzero(mask)) for reason, mask in masks.items()}
+    n_far = ranges.size - int(np.count_nonzero(keep)) - sum(unusable.values())
+    counts.update({"returns": ranges.size, **unusable, "out_of_range": n_far})
+    return np.asarray(keep, dtype=np.bool_)
+
+
+def _joined(parts: Sequence[NDArray[np.float32]]) -> NDArray[np.float32]:
+    return np.concatenate(parts).astype(np.float32, copy=False)
+
+
+@functools.lru_cache(maxsize=8)
+def _directions(
+    angle_min: float, increment: float, n: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Cosines and sines (n,) of the beams' angles in the scan plane."""
+    angles = angle_min + np.arange(n) * increment
+    return np.cos(angles), np.sin(angles)

@@ -1,0 +1,178 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""Clouds of a 3D lidar, of any field layout → points with a time each."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from bentwing.recording import point_times
+from bentwing.recording.batches import LidarBatch
+from bentwing.recording.messages.wire import BrokenMessageError
+
+if TYPE_CHECKING:
+    from collections import Counter
+
+    from numpy.typing import NDArray
+
+    from bentwing.recording.messages.wire_clouds import RawCloud, RawField
+    from bentwing.recording.point_times import TimeReading
+
+DATATYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
+INTENSITY_NAMES = ("intensity", "intensities", "reflectivity", "signal")
+RING_NAMES = ("ring", "channel", "line")
+
+
+class Columns(NamedTuple):
+    """Valid points of a cloud in the order of the message; `raw_times` as the sensor gives them."""
+
+    points: NDArray[np.float64]
+    raw_times: NDArray[np.generic] | None
+    intensity: NDArray[np.float32] | None
+    ring: NDArray[np.uint16] | None
+
+
+def time_field(cloud: RawCloud) -> str | None:
+    """Return the name of the field that holds the points' times, if there is one."""
+    return _find(_usable_fields(cloud), point_times.NAMES)
+
+
+def columns(cloud: RawCloud, counts: Counter[str]) -> Columns:
+    """Return the valid points of a cloud.
+
+    Parameters
+    ----------
+    cloud : the message
+    counts : receives `returns` (all points), `nan`, `inf`, `zero`
+
+    Raises
+    ------
+    BrokenMessageError
+        The layout contradicts itself, or x, y, z are missing.
+    """
+    table = _table(cloud).reshape(-1)
+    names = table.dtype.names or ()
+    if not {"x", "y", "z"} <= set(names):
+        found = ", ".join(field.name for field in cloud.fields) or "none"
+        msg = f"no fields x, y, z (found {found})"
+        raise BrokenMessageError(msg)
+    points = np.empty((len(table), 3))
+    for axis, name in enumerate("xyz"):
+        points[:, axis] = table[name]
+    keep = valid(points, counts)
+    if not keep.all():
+        points, table = points[keep], table[keep]
+    time, intensity, ring = (
+        _find(names, group) for group in (point_times.NAMES, INTENSITY_NAMES, RING_NAMES)
+    )
+    return Columns(
+        points,
+        None if time is None else _native(table[time]),
+        None if intensity is None else table[intensity].astype(np.float32),
+        None if ring is None else _rings(table[ring]),
+    )
+
+
+def sweep(
+    cols: Columns, reading: TimeReading | None, stamp_ns: int, start: float, counts: Counter[str]
+) -> LidarBatch:
+    """Return the points with times, sorted.
+
+    Parameters
+    ----------
+    cols : valid points
+    reading : how to read the time field; None puts every point at the header stamp
+    stamp_ns, start : header stamp, in ns and in s since the recording's start
+    counts : receives `bad_point_time`, points more than a second from their header
+    """
+    if reading is None or cols.raw_times is None:
+        times = np.full(len(cols.points), start)
+        return LidarBatch(cols.points, times, cols.intensity, cols.ring)
+    offsets = reading.offsets(cols.raw_times, stamp_ns)
+    limit = (
+        point_times.MAX_CLOCK_DIFFERENCE if reading.origin == "epoch" else point_times.MAX_OFFSET
+    )
+    keep = np.abs(offsets) <= limit
+    batch = LidarBatch(cols.points, start + offsets, cols.intensity, cols.ring)
+    if not keep.all():
+        counts["bad_point_time"] += int((~keep).sum())
+        batch = batch.where(keep)
+    if (batch.times[1:] < batch.times[:-1]).any():
+        batch = batch.where(np.argsort(batch.times, kind="stable"))
+    return batch
+
+
+def _table(cloud: RawCloud) -> NDArray[np.void]:
+    """(height, width) structured view on the message's bytes, no copy."""
+    fields = _usable_fields(cloud)
+    if not fields or cloud.point_step == 0:
+        msg = f"{len(cloud.fields)} fields in points of {cloud.point_step} bytes"
+        raise BrokenMessageError(msg)
+    n_row = cloud.width * cloud.point_step
+    # Some drivers leave row_step at zero in clouds of one row.
+    row_step = cloud.row_step if cloud.height > 1 else n_row
+    needed = (cloud.height - 1) * row_step + n_row if cloud.height * cloud.width else 0
+    if row_step < n_row or needed > len(cloud.data):
+        msg = (
+            f"{cloud.height} x {cloud.width} points of {cloud.point_step} bytes and rows of "
+            f"{cloud.row_step} bytes do not fit into {len(cloud.data)} bytes"
+        )
+        raise BrokenMessageError(msg)
+    order = ">" if cloud.big_endian else "<"
+    dtype = np.dtype(
+        {
+            "names": list(fields),
+            "formats": [order + DATATYPES[field.datatype] for field in fields.values()],
+            "offsets": [field.offset for field in fields.values()],
+            "itemsize": cloud.point_step,
+        }
+    )
+    shape = (cloud.height, cloud.width) if needed else (0, 0)
+    return np.ndarray(shape, dtype, cloud.data, strides=(row_step, cloud.point_step))
+
+
+def _usable_fields(cloud: RawCloud) -> dict[str, RawField]:
+    """Return the named scalar fields that lie within a point, the first of each name."""
+    fields: dict[str, RawField] = {}
+    for field in cloud.fields:
+        size = np.dtype(DATATYPES[field.datatype]).itemsize if field.datatype in DATATYPES else 0
+        # A number of zero is what some drivers write for a scalar.
+        if size and field.name and field.n_values <= 1 and field.offset + size <= cloud.point_step:
+            fields.setdefault(field.name, field)
+    return fields
+
+
+def valid(points: NDArray[np.float64], counts: Counter[str]) -> NDArray[np.bool_]:
+    """Return which points are returns; `is_dense` is not trusted, many drivers set it wrongly."""
+    counts["returns"] += len(points)
+    x, y, z = points.T
+    # Columns one by one: a reduction over rows of three takes several times longer.
+    is_finite = np.isfinite(x) & np.isfinite(y) & np.isfinite(z)
+    is_zero = (x == 0) & (y == 0) & (z == 0)
+    keep = is_finite & ~is_zero
+    if not keep.all():
+        is_nan = np.isnan(x) | np.isnan(y) | np.isnan(z)
+        counts["nan"] += int(is_nan.sum())
+        counts["inf"] += int((~is_finite & ~is_nan).sum())
+        counts["zero"] += int(is_zero.sum())
+    return np.asarray(keep, dtype=np.bool_)
+
+
+def _find(names: dict[str, RawField] | tuple[str, ...], wanted: tuple[str, ...]) -> str | None:
+    by_lower = {name.lower(): name for name in names}
+    return next((by_lower[name] for name in wanted if name in by_lower), None)
+
+
+def _native(values: NDArray[np.generic]) -> NDArray[np.generic]:
+    return np.ascontiguousarray(values.astype(values.dtype.newbyteorder("=")))
+
+
+def _rings(values: NDArray[np.generic]) -> NDArray[np.uint16] | None:
+    """Return beam numbers; a ring field that holds anything else is not used."""
+    if values.dtype.kind == "u" and values.dtype.itemsize <= 2:
+        return values.astype(np.uint16)
+    numbers = values.astype(np.float64)
+    if np.all((numbers >= 0) & (numbers < 65536)):
+        return numbers.astype(np.uint16)
+    return None

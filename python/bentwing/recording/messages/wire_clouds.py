@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""Read the clouds of 3D lidars straight from their bytes; arguments and errors as in `wire`."""
+
+from __future__ import annotations
+
+import struct
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from bentwing.recording.messages.wire import align, broken_if_malformed, header
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+MAX_POINT_FIELDS = 64
+
+
+class RawField(NamedTuple):
+    """Field of a PointCloud2."""
+
+    name: str
+    offset: int
+    datatype: int
+    n_values: int
+
+
+class RawCloud(NamedTuple):
+    """PointCloud2; `data` is a view on the message."""
+
+    stamp_ns: int
+    height: int
+    width: int
+    fields: tuple[RawField, ...]
+    big_endian: bool
+    point_step: int
+    row_step: int
+    data: memoryview
+
+
+class RawLivox(NamedTuple):
+    """Livox CustomMsg; `points` is structured: offset_time (ns), x, y, z (m), reflectivity, line."""
+
+    stamp_ns: int
+    points: NDArray[np.void]
+
+
+@broken_if_malformed
+def point_cloud(raw: bytes, *, cdr: bool) -> RawCloud:
+    """Read a sensor_msgs/PointCloud2; the points themselves stay where they are."""
+    stamp, position, order = header(raw, cdr=cdr)
+    position = align(position, 4, cdr=cdr)
+    height, width, n_fields = struct.unpack_from(f"{order}3I", raw, position)
+    position += 12
+    if n_fields > MAX_POINT_FIELDS:
+        msg = f"{n_fields} point fields"
+        raise ValueError(msg)
+    fields = []
+    for _ in range(n_fields):
+        field, position = _point_field(raw, position, order, cdr=cdr)
+        fields.append(field)
+    big_endian = bool(raw[position])
+    position = align(position + 1, 4, cdr=cdr)
+    point_step, row_step, size = struct.unpack_from(f"{order}3I", raw, position)
+    data = memoryview(raw)[position + 12 : position + 12 + size]
+    if len(data) != size:
+        msg = f"{len(data)} of {size} bytes"
+        raise ValueError(msg)
+    return RawCloud(stamp, height, width, tuple(fields), big_endian, point_step, row_step, data)
+
+
+def _point_field(raw: bytes, position: int, order: str, *, cdr: bool) -> tuple[RawField, int]:
+    position = align(position, 4, cdr=cdr)
+    (size,) = struct.unpack_from(f"{order}I", raw, position)
+    name = raw[position + 4 : position + 4 + size].rstrip(b"\0").decode()
+    position = align(position + 4 + size, 4, cdr=cdr)
+    offset, datatype = struct.unpack_from(f"{order}IB", raw, position)
+    position = align(position + 5, 4, cdr=cdr)
+    (count,) = struct.unpack_from(f"{order}I", raw, position)
+    return RawField(name, offset, datatype, count), position + 4
+
+
+@broken_if_malformed
+def livox_custom(raw: bytes, *, cdr: bool) -> RawLivox:
+    """Read a livox_ros_driver(2)/CustomMsg."""
+    _, position, order = header(raw, cdr=cdr)
+    position = align(position, 8, cdr=cdr)
+    timebase_ns, n_points = struct.unpack_from(f"{order}QI", raw, position)
+    position = align(position + 12 + 4, 4, cdr=cdr)
+    (count,) = struct.unpack_from(f"{order}I", raw, position)
+    if count != n_points and n_points != 0:
+        msg = f"{count} points announced as {n_points}"
+        raise ValueError(msg)
+    dtype = _livox_dtype(order, 20 if cdr else 19)
+    # CDR pads between points, not after the last one.
+    body = raw[position + 4 :] + (b"\0" if cdr else b"")
+    points = np.frombuffer(body, dtype, count)
+    stamp = header(raw, cdr=cdr)[0]
+    # The offsets count from the time base, which some drivers leave at zero.
+    return RawLivox(timebase_ns if 0 < timebase_ns < 2**63 and stamp else stamp, points)
+
+
+def _livox_dtype(order: str, step: int) -> np.dtype[np.void]:
+    return np.dtype(
+        {
+            "names": ["offset_time", "x", "y", "z", "reflectivity", "line"],
+            "formats": [f"{order}u4", f"{order}f4", f"{order}f4", f"{order}f4", "u1", "u1"],
+            "offsets": [0, 4, 8, 12, 16, 18],
+            "itemsize": step,
+        }
+    )

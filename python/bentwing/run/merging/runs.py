@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""Several runs into one map, or into as many as have nothing in common: the room on one screen."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from bentwing.base.errors import UsageError
+from bentwing.base.progress import Progress
+from bentwing.closing.global_registration import Budget, GlobalSettings
+from bentwing.closing.global_registration.stretches import length_of
+from bentwing.closing.joining.describe import describe_matches, describe_parts_of
+from bentwing.closing.joining.matches import Part, find_matches, parts_of
+from bentwing.closing.joining.placing import place_groups
+from bentwing.closing.joining.survey import Survey, survey
+from bentwing.map.clean import CleanSettings
+from bentwing.map.writer import require_format
+from bentwing.recording import Recording
+from bentwing.recording.preprocess import RecordingPart
+from bentwing.run.folder import RunFolder
+from bentwing.run.merging.maps import Ingredients, MergedMap, make_maps
+from bentwing.run.merging.source import Source, open_sources
+from bentwing.run.merging.writing import MapOptions, as_settings
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+
+@dataclass(frozen=True, slots=True)
+class Merged:
+    """What became of several runs.
+
+    Attributes
+    ----------
+    out : the folder
+    maps : one, or more where runs have no place in common
+    record : what run.json says about the merging
+    """
+
+    out: Path
+    maps: list[MergedMap]
+    record: dict[str, Any]
+
+
+def merge(
+    runs: Sequence[Path | str],
+    out: Path | str,
+    *,
+    map_format: str = "laz",
+    map_spacing: float = 0.0,
+    cleaning: CleanSettings | None = None,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> Merged:
+    """Merge runs into one map, without a guess where they lie.
+
+    Places that several runs saw are recognised, a robust pose graph puts the runs together, and one
+    non-rigid registration corrects all of them and their calibrations at once (Kaul 2015, section
+    2.2). Runs without a place in common are not forced together: each group becomes a map of its own
+    in a sub-folder of `out`.
+
+    Parameters
+    ----------
+    runs : folders that `bentwing map` has written; their recordings are read again
+    out : folder for the result; see `RunFolder` for what may be there already
+    map_format : one of `MAP_FORMATS`
+    map_spacing : m, edge of the voxels that keep one point each; 0 keeps all points
+    cleaning : what is left out of the map; default: mixed pixels and what moved, while a run was
+        flown or between the runs
+    threads : default: all cores
+    progress : what to tell the user meanwhile; default: nothing
+
+    Raises
+    ------
+    UsageError, InputError, EstimationError
+    """
+    require_format(map_format)
+    sources = open_sources([Path(run) for run in runs])
+    if any(Path(out).resolve() == source.folder.resolve() for source in sources):
+        msg = (
+            f"{out}: is one of the runs that are to be merged; choose another folder for the result"
+        )
+        raise UsageError(msg)
+    options = MapOptions(map_format, map_spacing, threads, cleaning or CleanSettings())
+    settings = {"runs": [str(s.folder.resolve()) for s in sources], **as_settings(options)}
+    with RunFolder(Path(out), settings) as folder:
+        return merge_into(folder, sources, options, progress or Progress())
+
+
+def merge_into(
+    folder: RunFolder, sources: list[Source], options: MapOptions, watch: Progress
+) -> Merged:
+    """Merge opened runs into a folder that is open, too; see `merge`."""
+    with folder.stage("inputs"):
+        folder.add_inputs([path for source in sources for path in source.recordings])
+    with folder.stage("survey"):
+        surveys = _surveyed(sources, options, watch)
+    parts = parts_of(surveys)
+    with folder.stage("match"), watch.stage("match", _n_pairs(len(parts)), "pairs") as shown:
+        matches = find_matches(parts, shown)
+    trajectories = {
+        Part(r, s): stretches.trajectory
+        for r, one in enumerate(surveys)
+        for s, stretches in enumerate(one.recorded.segments)
+    }
+    ties = [(part, Part(part.run, part.segment + 1)) for part in parts]
+    with folder.stage("place"):
+        groups, matches = place_groups(
+            trajectories, parts, matches, [tie for tie in ties if tie[1] in parts]
+        )
+    names = [source.name for source in sources]
+    record = {
+        "parts": describe_parts_of(names, parts),
+        "candidates": describe_matches(names, matches),
+        "maps": [],
+    }
+    folder.record["merging"] = record
+    folder.save()
+    found = Ingredients(sources, surveys, options, watch)
+    maps = make_maps(folder, groups, matches, found)
+    return Merged(folder.path, maps, record)
+
+
+def _n_pairs(n: int) -> float:
+    return n * (n - 1) / 2
+
+
+def _surveyed(sources: Sequence[Source], options: MapOptions, watch: Progress) -> list[Survey]:
+    seconds = sum(length_of(source.estimate) for source in sources)
+    budget = Budget.of(seconds, GlobalSettings())
+    watch.note(f"merging: {budget.sentence()}")
+    surveys = []
+    for source in sources:
+        with Recording(source.recordings, source.payload) as recording:
+            part = RecordingPart(recording, source.payload, source.start, source.duration)
+            with watch.stage(f"survey {source.name}", part.length) as shown:
+                surveys.append(
+                    survey(
+                        source.name,
+                        source.estimate,
+                        part.batches(shown, Counter()),
+                        source.payload,
+                        surfel_rate=budget.rate,
+                        threads=options.threads,
+                    )
+                )
+    return surveys

@@ -1,0 +1,196 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""Runs as they lie on the disk: trajectory, calibration, and the recording to read points from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pydantic import ValidationError
+
+from bentwing.base.errors import InputError, UsageError
+from bentwing.base.estimate import Estimate
+from bentwing.base.provenance import describe_input
+from bentwing.base.run_record import read_record
+from bentwing.base.trajectory import DT, read_tum
+from bentwing.odometry.segments import joined
+from bentwing.recording import Payload
+from bentwing.run.checkpoint import read_calibration
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from bentwing.base.trajectory import Trajectory
+
+_ROUNDED = 1e-6  # s; stamps in files are rounded to the nanosecond
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """A run that is to be merged.
+
+    Attributes
+    ----------
+    name : tells it from the others
+    folder : of the run
+    recordings : files that are one recording
+    start, duration : s, the part of the recording that was used; None for all of it
+    start_ns : time zero of the recording, ns UTC
+    inputs : what run.json says about the files
+    warnings : of the run
+    """
+
+    name: str
+    folder: Path
+    recordings: list[Path]
+    start: float | None
+    duration: float | None
+    start_ns: int
+    payload: Payload
+    estimate: Estimate
+    inputs: list[dict[str, Any]]
+    warnings: list[str]
+
+
+def open_sources(folders: Sequence[Path]) -> list[Source]:
+    """Read the runs in folders.
+
+    Raises
+    ------
+    UsageError
+        If there are fewer than two, one is given twice, or one is no complete run.
+    InputError
+        If a recording is gone or has changed, or a trajectory cannot be read.
+    """
+    if len(folders) < 2:
+        msg = (
+            f"{len(folders)} run given: merging takes two or more; bentwing merge RUN RUN... -o OUT"
+        )
+        raise UsageError(msg)
+    seen: dict[Path, Path] = {}
+    for folder in folders:
+        place = folder.resolve()
+        if place in seen:
+            msg = f"{folder}: is the same run as {seen[place]}; give each run once"
+            raise UsageError(msg)
+        seen[place] = folder
+    names = distinct_names([folder.resolve().name for folder in folders])
+    sources = [open_source(f, n) for f, n in zip(folders, names, strict=True)]
+    _refuse_same_recording(sources)
+    return sources
+
+
+def distinct_names(names: Sequence[str]) -> list[str]:
+    """Return names of which no two are the same: later ones get a number."""
+    found: list[str] = []
+    for name in names:
+        wanted, number = name or "run", 2
+        while wanted in found:
+            wanted, number = f"{name}_{number}", number + 1
+        found.append(wanted)
+    return found
+
+
+def open_source(folder: Path, name: str) -> Source:
+    """Read the run in a folder; see `open_sources`."""
+    record = read_record(folder)
+    if record.get("runs"):
+        of = ", ".join(str(run.get("folder")) for run in record["runs"])
+        msg = f"{folder}: holds a merged map; give the runs that it was made of ({of}) instead"
+        raise UsageError(msg)
+    if not record.get("complete"):
+        msg = f"{folder}: the run is not complete; finish it with `bentwing map ... --resume` first"
+        raise UsageError(msg)
+    if not record.get("recordings") or record.get("start_ns") is None:
+        msg = (
+            f"{folder}: run.json does not say where the recording lies, as those of earlier versions; "
+            "map it again"
+        )
+        raise UsageError(msg)
+    recordings = [Path(path) for path in record["recordings"]]
+    _require_unchanged(folder, recordings, record["inputs"])
+    settings = record["settings"]
+    return Source(
+        name,
+        folder,
+        recordings,
+        settings.get("start"),
+        settings.get("duration"),
+        int(record["start_ns"]),
+        _payload(folder, settings),
+        _estimate(folder, record),
+        record["inputs"],
+        list(record.get("warnings") or []),
+    )
+
+
+def _payload(folder: Path, settings: dict[str, Any]) -> Payload:
+    try:
+        return Payload.model_validate(settings["payload"])
+    except (KeyError, ValidationError) as error:
+        msg = (
+            f"{folder}: run.json describes no sensor head that can be used ({error}); map it again"
+        )
+        raise InputError(msg) from error
+
+
+def _estimate(folder: Path, record: dict[str, Any]) -> Estimate:
+    poses, _ = read_tum(folder / "trajectory.txt", int(record["start_ns"]))
+    spans = record.get("segments") or [[float(poses.times[0]), float(poses.times[-1])]]
+    cut = [poses.within([(a - _ROUNDED, b + _ROUNDED)]) for a, b in spans]
+    segments = [part for part in cut if len(part.times) > 1]
+    if not segments:
+        msg = f"{folder / 'trajectory.txt'}: does not cover the segments in run.json; map it again"
+        raise InputError(msg)
+    return Estimate(
+        joined(segments, DT),
+        read_calibration(record["calibration"]),
+        windows=record.get("windows") or [],
+        segments=[_span(part) for part in segments],
+    )
+
+
+def _span(part: Trajectory) -> tuple[float, float]:
+    return float(part.times[0]), float(part.times[-1])
+
+
+def _require_unchanged(
+    folder: Path, recordings: Sequence[Path], inputs: Sequence[dict[str, Any]]
+) -> None:
+    gone = [path for path in recordings if not path.exists()]
+    if gone:
+        msg = (
+            f"{folder}: its recording {gone[0]} is gone, and merging reads the points again; "
+            "put it back there, or map it again from where it is now"
+        )
+        raise InputError(msg)
+    known = {(i["name"], i["bytes"], i["sha256"]) for i in inputs}
+    for path in recordings:
+        files = sorted(path.rglob("*")) if path.is_dir() else [path]
+        for file in (file for file in files if file.is_file()):
+            now = describe_input(file)
+            if (now["name"], now["bytes"], now["sha256"]) not in known:
+                msg = (
+                    f"{file}: is not the recording that {folder} was made of (its size or SHA-256 "
+                    "differs); map it again, or put the old one back"
+                )
+                raise InputError(msg)
+
+
+def _refuse_same_recording(sources: Sequence[Source]) -> None:
+    """Refuse runs of the same part of a recording: they would confirm each other's errors."""
+    seen: dict[tuple[Any, ...], Source] = {}
+    for source in sources:
+        own = {path.name for path in source.recordings}
+        hashes = [i["sha256"] for i in source.inputs if i["name"] in own] or [
+            i["sha256"] for i in source.inputs
+        ]
+        key = (*sorted(hashes), source.start, source.duration)
+        if key in seen:
+            msg = (
+                f"{source.folder}: is a run of the same recording as {seen[key].folder}; "
+                "give each recording once"
+            )
+            raise UsageError(msg)
+        seen[key] = source

@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+import numpy as np
+import pytest
+
+from bentwing.base.errors import InputError
+from bentwing.closing.georeference.control_points import plane_around, read_control_points
+
+
+def read(tmp_path, text):
+    path = tmp_path / "points.csv"
+    path.write_text(text, encoding="utf-8")
+    return read_control_points(path)
+
+
+def test_points_are_read_with_their_use(tmp_path):
+    text = "# surveyed\nid, x, y, z, radius, use\nA,1,2,3,0.5,check\n\nB,4,5,6,0.25,\n"
+    first, second = read(tmp_path, text)
+    assert (first.name, first.use, second.use) == ("A", "check", "control")
+    assert second.position.tolist() == [4, 5, 6]
+    assert second.radius == 0.25
+
+
+@pytest.mark.parametrize(
+    ("text", "what"),
+    [
+        ("id,x,y,z\nA,1,2,3\n", "no column radius"),
+        ("id,x,y,z,radius\nA,1,2,b,1\n", "point 'A'"),
+        ("id,x,y,z,radius\nA,1,2,3,-1\n", "point 'A'"),
+        ("id,x,y,z,radius\nA,1,2\n", "point 'A'"),
+        ("id,x,y,z,radius,use\nA,1,2,3,1,maybe\n", "control or check"),
+        ("id,x,y,z,radius\nA,1,2,3,1\nA,1,2,3,1\n", "A twice"),
+        ("id,x,y,z,radius\n", "holds no point"),
+    ],
+)
+def test_a_bad_file_says_what_is_wrong(tmp_path, text, what):
+    with pytest.raises(InputError, match=what):
+        read(tmp_path, text)
+
+
+def patch(offset, noise=0.01, n=2000):
+    rng = np.random.default_rng(0)
+    points = np.c_[rng.uniform(-1, 1, (n, 2)), offset + noise * rng.normal(size=n)]
+    return points, np.linspace(3, 4, n)
+
+
+def test_the_plane_through_a_patch_has_its_height():
+    for offset in (0.0, 0.2, -0.25):
+        plane = plane_around(*patch(offset), np.zeros(3), 0.3, slack=0.3)
+        assert plane is not None
+        assert abs(plane.middle[2] - offset) < 0.002
+        assert plane.normal[2] > 0.999
+        assert 0.008 < plane.thickness < 0.012
+        assert 3 < plane.time < 4
+
+
+def test_what_stands_on_a_floor_does_not_lift_it():
+    points, times = patch(0.0)
+    post = np.c_[np.full((30, 2), 0.05), np.linspace(0.05, 0.3, 30)]
+    plane = plane_around(np.r_[points, post], np.r_[times, times[:30]], np.zeros(3), 0.3)
+    assert plane is not None
+    assert abs(plane.middle[2]) < 0.003
+
+
+def test_where_there_is_no_surface_there_is_no_plane():
+    points, times = patch(0.0)
+    assert plane_around(points, times, np.array([9.0, 9, 9]), 0.3) is None
+    line = np.c_[np.linspace(-1, 1, 500), np.zeros((500, 2))]
+    assert plane_around(line, np.zeros(500), np.zeros(3), 0.3) is None

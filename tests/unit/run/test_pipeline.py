@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+import json
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bentwing import odometry
+from bentwing.base.calibration import Calibration
+from bentwing.base.errors import EstimationError, UsageError
+from bentwing.base.estimate import Estimate
+from bentwing.base.trajectory import Trajectory, read_tum
+from bentwing.map.read import read_points
+from bentwing.recording import Clock, ImuBatch, LidarBatch, Payload
+from bentwing.recording.described import described_mount
+from bentwing.run import pipeline
+from bentwing.run.settings import settings_text
+
+ORIGIN_NS = 1_700_000_000_000_000_001
+PAYLOAD = Payload.model_validate({"T_imu_lidar": {}})
+
+
+class FakeRecording:
+    """Ten seconds at rest, 100 points in every tenth of a second."""
+
+    duration = 10.0
+    warnings = ("/imu: a gap of 0.2 s",)
+    clock = Clock(ORIGIN_NS)
+
+    def __init__(self, paths, payload):
+        del payload
+        self.paths = [Path(path) for path in paths]
+        self.counts = Counter({"lidar.points": 10_000})
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        pass
+
+    def batches(self, start=None, duration=None):
+        rng = np.random.default_rng(0)
+        begin = start or 0.0
+        for t in np.arange(begin, begin + (duration or 10.0 - begin), 0.1):
+            times = t + 0.001 * np.arange(100)
+            yield ImuBatch(times, np.tile([0.0, 0.0, 4.0], (100, 1)), np.zeros((100, 3)))
+            yield LidarBatch(rng.uniform(-5, 5, (100, 3)), times)
+
+
+class FakeEstimator:
+    settings = None
+    fail_at = np.inf
+
+    def __init__(self):
+        self.last = 0.0
+
+    def feed(self, batch):
+        self.last = batch.times[-1]
+        if self.last > self.fail_at:
+            raise EstimationError("no matches")
+
+    def result(self):
+        return self.so_far()
+
+    def so_far(self):
+        times = np.arange(0, self.last + 0.01, 0.01)
+        trajectory = Trajectory(
+            times, np.zeros((len(times), 3)), np.tile([0.0, 0, 0, 1], (len(times), 1))
+        )
+        calibration = Calibration(
+            0.0,
+            described_mount(PAYLOAD),
+            np.zeros(3),
+            np.zeros(3),
+            np.array([0, 0, 9.8]),
+        )
+        return Estimate(trajectory, calibration, warnings=["one plane only at 3 s"])
+
+
+@pytest.fixture
+def recording(tmp_path, monkeypatch):
+    monkeypatch.setattr(pipeline, "Recording", FakeRecording)
+    monkeypatch.setattr(odometry, "create", lambda *_: FakeEstimator(), raising=False)
+    (tmp_path / "yard.mcap").write_bytes(b"recording")
+    return [tmp_path / "yard.mcap"]
+
+
+def record_of(out):
+    return json.loads((out / "run.json").read_text())
+
+
+def test_a_run_leaves_all_files_of_the_contract(tmp_path, recording):
+    out = tmp_path / "out"
+    run = pipeline.map_recording(recording, PAYLOAD, out)
+    names = {"trajectory.txt", "odometry.txt", "map.laz", "map_top.png", "report.html", "run.json"}
+    assert {file.name for file in out.iterdir()} == names
+    counts = record_of(out)["counts"]
+    assert len(read_points(out / "map.laz")) == counts["map.written"] == len(run.sample.points)
+    # points anywhere in the room have been seen through by some of the beams
+    assert counts["map.written"] + counts["map.moving"] + counts["map.mixed_pixels"] == 10_000
+    assert counts["map.moving"] < 500
+    trajectory, origin_ns = read_tum(out / "trajectory.txt")
+    assert origin_ns == ORIGIN_NS
+    assert np.allclose(np.diff(trajectory.times), 0.01)
+    record = record_of(out)
+    assert record["complete"] is True
+    assert record["counts"]["map.points"] == record["counts"]["lidar.points"] == 10_000
+    assert record["warnings"] == ["/imu: a gap of 0.2 s", "one plane only at 3 s"]
+    assert set(record["timings"]) == {"inputs", "estimate", "loops", "map", "report", "total"}
+    assert "Map finished, with 2 warnings" in (out / "report.html").read_text()
+    assert run.spin_rates[0] == 4.0
+
+
+def test_a_part_of_the_recording_and_a_spacing_can_be_asked_for(tmp_path, recording):
+    out = tmp_path / "out"
+    pipeline.map_recording(recording, PAYLOAD, out, duration=2.0, map_format="ply", map_spacing=5.0)
+    assert len(read_points(out / "map.ply")) <= 8
+    assert record_of(out)["counts"]["map.points"] == 2000
+
+
+def test_a_failed_estimate_keeps_the_odometry_and_explains_itself(tmp_path, recording, monkeypatch):
+    out = tmp_path / "out"
+    pipeline.map_recording(recording, PAYLOAD, out)
+    monkeypatch.setattr(FakeEstimator, "fail_at", 5.0)
+    with pytest.raises(EstimationError, match="no matches"):
+        pipeline.map_recording(recording, PAYLOAD, out)
+    record = record_of(out)
+    assert (record["complete"], record["stage"], record["reason"]) == (
+        False,
+        "estimate",
+        "no matches",
+    )
+    assert record["files"] == ["odometry.txt", "report.html"]
+    assert read_tum(out / "odometry.txt")[0].times[-1] == pytest.approx(5.0, abs=0.2)
+    assert "Incomplete" in (out / "report.html").read_text()
+
+
+def test_an_interrupt_while_mapping_leaves_the_trajectory_and_no_half_map(
+    tmp_path, recording, monkeypatch
+):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(pipeline.MapSample, "add", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        pipeline.map_recording(recording, PAYLOAD, tmp_path / "out")
+    record = record_of(tmp_path / "out")
+    assert (record["stage"], record["reason"]) == ("map", "interrupted")
+    assert record["files"] == ["odometry.txt", "trajectory.txt", "checkpoint.npz", "report.html"]
+    assert {f.name for f in (tmp_path / "out").iterdir()} == {*record["files"], "run.json"}
+
+
+@pytest.mark.parametrize("wrong", [{"map_format": "obj"}, {"estimator": "x"}])
+def test_wrong_options_are_refused_before_anything_is_written(tmp_path, recording, wrong):
+    with pytest.raises(UsageError):
+        pipeline.map_recording(recording, PAYLOAD, tmp_path / "out", **wrong)
+    assert not (tmp_path / "out").exists()
+
+
+def test_settings_are_told_as_yaml(recording):
+    del recording
+    assert "T_imu_lidar" in settings_text("continuous", PAYLOAD)

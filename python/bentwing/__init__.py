@@ -68,7 +68,7 @@ _HOMES = {
 
 def __getattr__(name: str) -> object:
     if name == "__version__":
-        return import_module("bentwing.base.run_record").bentwing_version()
+        return import_module("bentwing.base.provenance").bentwing_version()
     if name not in __all__:
         msg = f"module {__name__!r} has no attribute {name!r}"
         raise AttributeError(msg)

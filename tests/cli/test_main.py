@@ -8,13 +8,16 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
+import yaml
 
 from bentwing.base.errors import BentwingError, EstimationError, RecordingError, UsageError
 from bentwing.cli.commands import COMMANDS
 from bentwing.cli.main import run_command
 from bentwing.closing.georeference import GeoreferenceSettings
 from bentwing.map.clean import CleanSettings
-from bentwing.run import pipeline, settings
+from bentwing.recording import Payload
+from bentwing.run import pipeline
+from bentwing.run.settings import RunSettings, run_settings
 
 BENTWING = "from bentwing.cli.main import run; run()"
 
@@ -27,7 +30,7 @@ def called(monkeypatch):
     def record(*arguments, **options):
         calls.append((arguments, options))
 
-    monkeypatch.setattr(pipeline, "map_recording", record)
+    monkeypatch.setattr(pipeline, "run_recording", record)
     return calls
 
 
@@ -35,7 +38,7 @@ def failing(monkeypatch, error):
     def fail(*_, **__):
         raise error
 
-    monkeypatch.setattr(pipeline, "map_recording", fail)
+    monkeypatch.setattr(pipeline, "run_recording", fail)
 
 
 def test_help_names_the_commands(capsys):
@@ -98,34 +101,42 @@ def test_wrong_usage_is_one_sentence_and_exit_code_2(capsys, arguments, message)
     assert err.count("\n") == 1
 
 
-def test_options_reach_the_pipeline(called, capsys, monkeypatch):
+def test_options_reach_the_pipeline(called, capsys, monkeypatch, tmp_path):
     # The files do not exist: say that they are the parts of one recording.
     monkeypatch.setattr("bentwing.recording.flights.flights_of", lambda paths: [paths])
+    head = tmp_path / "head.yaml"
+    head.write_text("name: head\n")
     arguments = [
-        "map", "a.mcap", "b.mcap", "--payload", "head.yaml", "-o", "out", "--map-format", "ply",
+        "map", "a.mcap", "b.mcap", "--payload", str(head), "-o", "out", "--map-format", "ply",
         "--map-spacing", "0.02", "--no-loop-closure", "--threads", "2", "--start", "5",
         "--duration", "60", "--keep-moving", "--epsg", "25832", "--control-points", "targets.csv",
         "--quiet",
     ]  # fmt: skip
     assert run_command(arguments) == 0
-    ((paths, payload, out), options) = called[0]
-    assert paths == [Path("a.mcap"), Path("b.mcap")]
-    assert (payload, out) == (Path("head.yaml"), Path("out"))
+    ((paths, out, chosen, payload), options) = called[0]
+    assert (paths, out, payload) == ([Path("a.mcap"), Path("b.mcap")], Path("out"), head)
     options.pop("progress")
-    assert options.pop("cleaning") == CleanSettings(moving=False)
-    points = Path("targets.csv")
-    assert options.pop("georeferencing") == GeoreferenceSettings(epsg=25832, control_points=points)
-    assert options == {
-        "estimator": "continuous", "map_format": "ply", "map_spacing": 0.02, "loop_closure": False,
-        "threads": 2, "start": 5.0, "duration": 60.0, "resume": False,
-    }  # fmt: skip
+    assert options == {"resume": False}
+    assert chosen == run_settings(
+        payload=Payload.load(head),
+        map_format="ply",
+        map_spacing=0.02,
+        loop_closure=False,
+        threads=2,
+        start=5.0,
+        duration=60.0,
+        cleaning=CleanSettings(moving=False),
+        georeferencing=GeoreferenceSettings(epsg=25832, control_points=Path("targets.csv")),
+    )
     assert capsys.readouterr() == ("", "")
 
 
-def test_settings_are_shown_without_a_recording(called, capsys, monkeypatch):
-    monkeypatch.setattr(settings, "settings_text", lambda *asked: f"{asked}")
-    assert run_command(["map", "--print-settings", "--payload", "head.yaml"]) == 0
-    assert "('continuous', PosixPath('head.yaml'))" in capsys.readouterr().out
+def test_settings_are_shown_without_a_recording(called, capsys, tmp_path):
+    head = tmp_path / "head.yaml"
+    head.write_text("name: seven\n")
+    assert run_command(["map", "--print-settings", "--payload", str(head)]) == 0
+    shown = RunSettings.model_validate(yaml.safe_load(capsys.readouterr().out))
+    assert shown == run_settings(payload=Payload.load(head))
     assert called == []
 
 
@@ -174,11 +185,12 @@ def test_an_interrupt_ends_a_running_command_within_a_second(tmp_path):
     script = f"""
 import signal, time
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a background job ignores it
+from bentwing.recording import Payload
 from bentwing.run import pipeline
 def busy(*_, **__):
     print("busy", flush=True)
     time.sleep(60)
-pipeline.map_recording = busy
+pipeline.run_recording = busy
 import sys
 sys.argv = ["bentwing", "map", "a", "-o", {str(tmp_path)!r}]
 {BENTWING}

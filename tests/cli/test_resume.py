@@ -83,11 +83,13 @@ def killed(asked, tmp_path):
 
 
 def test_a_finished_stage_is_not_done_again(asked, killed):
+    with np.load(killed / "checkpoint.npz") as stored:
+        before = json.loads(str(stored["described"]))["timings"]
     finished(start(asked, killed, "--resume"))
-    timings = record_of(killed)["timings"]
-    assert "map" in timings
+    after = record_of(killed)["timings"]
+    assert "map" in after
+    assert after["estimate"] == before["estimate"]
     assert not (killed / "checkpoint.npz").exists()
-    assert timings["total"] < timings["estimate"] + timings["map"] + timings["report"]
 
 
 def test_other_settings_are_refused(asked, killed):

@@ -44,21 +44,21 @@ def localize_command(
     """
     # slow to import, so only when it is needed
     from bentwing.base.progress import create_progress
-    from bentwing.run.pipeline import map_recording
+    from bentwing.run.pipeline import run_recording
+    from bentwing.run.settings import as_run_settings
 
-    map_recording(
-        recording,
-        payload,
-        out,
+    settings = as_run_settings(
         estimator=estimator,
+        payload=payload,
+        settings=None,
         map_format=map_format,
         map_spacing=map_spacing,
         prior_map=prior_map,
         threads=threads,
         start=start,
         duration=duration,
-        resume=resume,
-        progress=create_progress(quiet=quiet),
     )
+    progress = create_progress(quiet=quiet)
+    run_recording(recording, out, settings, payload, resume=resume, progress=progress)
     if not quiet:
         typer.echo(f"{out}: open {out / 'report.html'}")

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from pathlib import Path  # noqa: TC003 - typer reads the annotations
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -79,35 +79,36 @@ def map_command(
     from bentwing.map.clean import CleanSettings
     from bentwing.recording.flights import flights_of
     from bentwing.run.flights import map_flights
-    from bentwing.run.pipeline import map_recording
-    from bentwing.run.settings import settings_text
+    from bentwing.run.pipeline import run_recording
+    from bentwing.run.settings import as_run_settings
 
+    settings = as_run_settings(
+        estimator=estimator,
+        payload=payload,
+        settings=None,
+        map_format=map_format,
+        map_spacing=map_spacing,
+        cleaning=CleanSettings(mixed_pixels=not keep_mixed, moving=not keep_moving),
+        georeferencing=georeferencing_settings(georeference, epsg, control_points),
+        loop_closure=False if no_loop_closure else None,
+        threads=threads,
+        start=start,
+        duration=duration,
+    )
     if print_settings:
-        typer.echo(settings_text(estimator, payload))
+        typer.echo(settings.to_yaml())
         return
     if not recording or out is None:
         msg = "a recording and a folder for the results are needed: bentwing map RECORDING -o OUT"
         raise UsageError(msg)
-    options: dict[str, Any] = {
-        "estimator": estimator,
-        "map_format": map_format,
-        "map_spacing": map_spacing,
-        "cleaning": CleanSettings(mixed_pixels=not keep_mixed, moving=not keep_moving),
-        "georeferencing": georeferencing_settings(georeference, epsg, control_points),
-        "loop_closure": not no_loop_closure,
-        "threads": threads,
-        "start": start,
-        "duration": duration,
-        "resume": resume,
-        "progress": create_progress(quiet=quiet),
-    }
+    progress = create_progress(quiet=quiet)
     flights = flights_of(recording) if len(recording) > 1 else [recording]
     if len(flights) > 1:
-        merged = map_flights(flights, payload, out, **options)
+        merged = map_flights(flights, out, settings, payload, resume=resume, progress=progress)
         if not quiet:
             say_maps(merged)
         return
-    map_recording(recording, payload, out, **options)
+    run_recording(recording, out, settings, payload, resume=resume, progress=progress)
     if not quiet:
         typer.echo(f"{out}: open {out / 'report.html'}")
 

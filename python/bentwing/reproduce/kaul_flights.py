@@ -19,7 +19,8 @@ from bentwing.map.project import project
 from bentwing.map.writer import open_map
 from bentwing.recording import Payload, Recording
 from bentwing.recording.preprocess import RecordingPart
-from bentwing.run.pipeline import map_recording
+from bentwing.run.pipeline import finish_recording
+from bentwing.run.settings import as_run_settings
 from bentwing.simulate.instruments import TerrestrialErrors, choose_stations, scan, track
 from bentwing.simulate.ros import EPOCH_NS
 from bentwing.simulate.scenario import Scenario
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from bentwing.reproduce.figure import Assignment
+    from bentwing.run.found import Found
     from bentwing.run.run import Run
     from bentwing.simulate.scenario import SceneName
     from bentwing.simulate.setup import Setup
@@ -76,7 +78,8 @@ class Flown:
     setup : world, rig and sensors of the simulation
     files : recording and truth
     folder : of the run
-    run, record : what the run found, and its run.json
+    run, record : the run, and its run.json
+    found : what its stages have found
     """
 
     plan: FlightPlan
@@ -84,6 +87,7 @@ class Flown:
     files: SimulatedRecording
     folder: Path
     run: Run
+    found: Found
     record: dict[str, Any]
 
     @property
@@ -115,9 +119,12 @@ def fly_and_map(plan: FlightPlan, assignment: Assignment) -> Flown:
 
         files = write_recording(setup, scenario, folder, advance)
     out = folder / "run"
-    run = map_recording(files.recording, files.payload, out, progress=assignment.progress)
+    settings = as_run_settings(estimator="continuous", payload=files.payload, settings=None)
+    run, found = finish_recording(
+        files.recording, out, settings, files.payload, progress=assignment.progress
+    )
     record = json.loads((out / "run.json").read_text(encoding="utf-8"))
-    return Flown(plan, setup, files, out, run, record)
+    return Flown(plan, setup, files, out, run, found, record)
 
 
 def truth_of(flown: Flown) -> tuple[Trajectory, int]:
@@ -165,9 +172,6 @@ def write_best_map(flown: Flown, assignment: Assignment, truth: Trajectory) -> P
     """Write the map that true poses and calibration make: nothing but the lidar's noise is in it."""
     true = yaml.safe_load(flown.files.calibration.read_text(encoding="utf-8"))
     estimate = flown.run.estimate
-    if estimate is None:
-        msg = f"the run of the {flown.plan.name} has no estimate"
-        raise ValueError(msg)
     mount = true["T_imu_lidar"]
     pose = Pose(np.array(mount["translation"]), np.array(mount["quaternion"]))
     calibration = replace(estimate.calibration, latency=true["latency"], mount=FixedMount(pose))

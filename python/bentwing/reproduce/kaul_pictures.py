@@ -27,7 +27,7 @@ _PATH_STEP = 10  # of 100 Hz poses
 
 def map_from_above(flown: Flown, table: tuple[str, ...] = CLAY) -> str:
     """Plan of a map with the way by time, blue to yellow; a roof is left out."""
-    points, times = flown.run.sample.points, flown.run.sample.times
+    points, times = flown.found.sample.points, flown.found.sample.times
     kept = ~overhead_points(points, times, flown.run.trajectory)
     x, y, z = points[kept].T
     view = paint(project(x, y, z, width=1000, max_height=800), z, table=table)
@@ -38,7 +38,7 @@ def map_from_above(flown: Flown, table: tuple[str, ...] = CLAY) -> str:
 
 def map_oblique(flown: Flown, table: tuple[str, ...] = CLAY) -> str:
     """Oblique view of a map with the way by time."""
-    points = flown.run.sample.points
+    points = flown.found.sample.points
     path = flown.run.trajectory.positions[::_PATH_STEP]
     return oblique_view(points, points[:, 2], "height, m", table, path=path)
 

@@ -35,7 +35,7 @@ def flight_rows(flown: Flown, measured: Measured) -> list[Compared]:
     slow, fast = np.percentile(measured.speeds, [10, 90])
     minutes = flown.duration / 60
     total = flown.record["timings"]["total"]
-    spin = np.degrees(np.array(flown.run.spin_rates))
+    spin = np.degrees(np.array(flown.found.spin.rates))
     spun = spin[spin > 60.0]
     return [
         Compared(

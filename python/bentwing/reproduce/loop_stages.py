@@ -88,12 +88,9 @@ def loop_figures(
 def loop_stages(flown: Flown) -> LoopStages:
     """Put drift into the run's odometry and take it out again."""
     estimate = flown.run.estimate
-    if estimate is None:
-        msg = f"the run of the {flown.plan.name} has no estimate"
-        raise ValueError(msg)
     drifted = with_drift(estimate.trajectory)
-    times = flown.run.sample.times
-    points = moved(flown.run.sample.points, times, estimate.trajectory, drifted)
+    times = flown.found.sample.times
+    points = moved(flown.found.sample.points, times, estimate.trajectory, drifted)
     places = describe_run(points, times, drifted)
     linked, n_links, n_false = _linked(drifted, places)
     payload = Payload.load(flown.files.payload)
@@ -179,9 +176,8 @@ def _linked(drifted: Trajectory, places: list[Place]) -> tuple[Trajectory, int, 
 
 def _by_time(flown: Flown, trajectory: Trajectory, middle: Array) -> str:
     """Plan of a crop of the map by time."""
-    estimate = flown.run.estimate
-    sample, source = flown.run.sample, trajectory if estimate is None else estimate.trajectory
-    points = moved(sample.points, sample.times, source, trajectory)
+    sample = flown.found.sample
+    points = moved(sample.points, sample.times, flown.run.trajectory, trajectory)
     near = np.all(np.abs(points[:, :2] - middle[:2]) < _CROP, axis=1)
     near &= (
         points[:, 2] > trajectory.positions[0, 2] + 0.15

@@ -21,28 +21,17 @@ from bentwing.base.estimate import Estimate
 from bentwing.base.mount import FixedMount, MotorMount, Pose
 from bentwing.base.plain import plain
 from bentwing.base.trajectory import Trajectory
+from bentwing.run.found import Found, Reading, Spin
 
 if TYPE_CHECKING:
     from bentwing.base.mount import Mount
     from bentwing.run.folder import RunFolder
-    from bentwing.run.run import Run
 
 NAME = "checkpoint.npz"
 _TRAJECTORY = ("times", "positions", "quats_xyzw")
-# What the stages have written into the record.
-_RECORDED = (
-    "counts",
-    "timings",
-    "warnings",
-    "calibration",
-    "loop_closure",
-    "localization",
-    "merging",
-    "segments",
-    "windows",
-)
+_OF_ESTIMATE = ("windows", "counts", "timings", "warnings", "segments")
+_CORRECTIONS = ("localization", "loop_closure", "merging")
 # What must be the same for a run to go on; the number of threads changes no bit.
-_ASKED = ("settings", "inputs")
 _FREE = frozenset({"threads"})
 
 
@@ -58,77 +47,82 @@ class Checkpoint:
         self._folder = folder
         self._path = folder.path / NAME
 
-    def save(self, stage: str, run: Run) -> None:
+    def save(self, stage: str, found: Found) -> None:
         """Keep what the run has found, at the end of a stage."""
-        estimate = run.estimate
+        estimate, record = found.estimate, self._folder.record
         if estimate is None:
             return
-        record = self._folder.record
         arrays = {name: getattr(estimate.trajectory, name) for name in _TRAJECTORY}
         described = {
             "stage": stage,
             "asked": self._asked(),
-            "calibration": plain(estimate.calibration),
-            "estimate": {
-                name: plain(getattr(estimate, name))
-                for name in ("windows", "counts", "timings", "warnings", "segments")
-            },
-            "record": {name: plain(record.get(name)) for name in _RECORDED},
-            "files": [name for name in record["files"] if name != NAME],
+            "calibration": estimate.calibration,
+            "estimate": {name: getattr(estimate, name) for name in _OF_ESTIMATE},
+            "reading": found.reading,
+            "corrections": {name: getattr(found, name) for name in _CORRECTIONS},
+            "notes": found.notes,
+            "timings": record.timings,
+            "files": [name for name in record.files if name != NAME],
         }
         data = io.BytesIO()
         np.savez(
             data,
-            described=np.array(json.dumps(described)),
-            spin=np.array([run.spin_times, run.spin_rates]),
+            described=np.array(json.dumps(plain(described))),
+            spin=np.array([found.spin.times, found.spin.rates]),
             **arrays,
         )
         write_bytes(self._folder.file(NAME), data.getvalue())
         self._folder.save()  # a run that is killed now is known to have this file
 
-    def restore(self, run: Run) -> str | None:
-        """Read back what an earlier run has found; returns its last stage, None if there is none.
+    def restore(self, *, resume: bool) -> tuple[str | None, Found]:
+        """Read back what an earlier run has found.
+
+        Parameters
+        ----------
+        resume : whether an earlier run counts
+
+        Returns
+        -------
+        The last stage that is done, None if the run begins anew, and what was found until then.
 
         Raises
         ------
         UsageError
             If that run had other inputs or settings.
         """
+        if not resume:
+            return None, Found()
         try:
             with np.load(self._path, allow_pickle=False) as stored:
                 arrays = {name: stored[name] for name in (*_TRAJECTORY, "spin")}
                 described = json.loads(str(stored["described"]))
         except FileNotFoundError:
-            return None
+            return None, Found()
         except (OSError, ValueError, KeyError, BadZipFile) as error:
-            self._folder.record["warnings"].append(
-                f"{self._path}: cannot be read ({error}); the run begins anew"
-            )
-            return None
+            note = f"{self._path}: cannot be read ({error}); the run begins anew"
+            return None, Found(notes=(note,))
         self._require_same(described["asked"])
         if not all((self._folder.path / name).exists() for name in described["files"]):
-            return None
-        trajectory = Trajectory(*(arrays[name] for name in _TRAJECTORY))
-        fields = described["estimate"]
-        fields["segments"] = [(first, last) for first, last in fields["segments"]]
-        run.estimate = Estimate(trajectory, read_calibration(described["calibration"]), **fields)
-        run.spin_times, run.spin_rates = arrays["spin"].tolist()
-        self._folder.record.update(described["record"])
+            return None, Found()
         for name in (*described["files"], NAME):
             self._folder.file(name)
-        return str(described["stage"])
+        for stage, seconds in described["timings"].items():
+            self._folder.record.add_seconds(stage, seconds)
+        self._folder.record.found = _found(arrays, described)
+        return str(described["stage"]), self._folder.record.found
 
     def discard(self) -> None:
         """Remove what only an unfinished run needs."""
         self._path.unlink(missing_ok=True)
-        files = self._folder.record["files"]
+        files = self._folder.record.files
         if NAME in files:
             files.remove(NAME)
 
     def _asked(self) -> dict[str, Any]:
-        record = plain({name: self._folder.record[name] for name in _ASKED})
-        settings = {k: v for k, v in record["settings"].items() if k not in _FREE}
-        return {**settings, "inputs": record["inputs"]}
+        record = self._folder.record
+        settings = {k: v for k, v in record.settings.items() if k not in _FREE}
+        asked: dict[str, Any] = plain({**settings, "inputs": record.inputs})
+        return asked
 
     def _require_same(self, earlier: dict[str, Any]) -> None:
         now = self._asked()
@@ -139,6 +133,19 @@ class Checkpoint:
                 "give the same, or leave --resume out to begin anew"
             )
             raise UsageError(msg)
+
+
+def _found(arrays: dict[str, Any], described: dict[str, Any]) -> Found:
+    fields = described["estimate"]
+    fields["segments"] = [(first, last) for first, last in fields["segments"]]
+    trajectory = Trajectory(*(arrays[name] for name in _TRAJECTORY))
+    return Found(
+        Estimate(trajectory, read_calibration(described["calibration"]), **fields),
+        Reading(**described["reading"]),
+        Spin(*arrays["spin"].tolist()),
+        **described["corrections"],
+        notes=tuple(described["notes"]),
+    )
 
 
 def read_calibration(described: dict[str, Any]) -> Calibration:

@@ -4,24 +4,20 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from bentwing.base.errors import UsageError
-from bentwing.base.plain import plain
 from bentwing.base.progress import Progress
 from bentwing.base.run_record import read_record
-from bentwing.map.clean import CleanSettings
 from bentwing.run.folder import RunFolder
 from bentwing.run.merging import merge_into, open_sources
 from bentwing.run.merging.source import distinct_names
-from bentwing.run.merging.writing import MapOptions
-from bentwing.run.pipeline import map_recording
-from bentwing.run.settings import load_payload
+from bentwing.run.pipeline import run_recording
+from bentwing.run.settings import RunSettings, merge_settings
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from bentwing.recording import Payload
     from bentwing.run.merging import Merged
 
 RUNS = "runs"
@@ -30,16 +26,12 @@ RUNS = "runs"
 
 def map_flights(
     flights: Sequence[Sequence[Path]],
-    payload: Payload | Path | str | None,
     out: Path | str,
+    settings: RunSettings,
+    payload_file: Path | str | None = None,
     *,
-    map_format: str = "laz",
-    map_spacing: float = 0.0,
-    cleaning: CleanSettings | None = None,
-    threads: int | None = None,
     resume: bool = False,
     progress: Progress | None = None,
-    **options: Any,  # noqa: ANN401 - handed on as they are
 ) -> Merged:
     """Map several flights, each into a folder of its own in `out`, and merge them.
 
@@ -47,8 +39,9 @@ def map_flights(
     ----------
     flights : the files of each
     out : folder for the merged map; the runs of the flights go into `out/runs`
+    settings : of each run; `start` and `duration` have no meaning here
+    payload_file : that `settings.payload` was read from
     resume : leave flights that are mapped already, in the same way, as they are, and go on with others
-    options : further ones of `map_recording`; `start` and `duration` have no meaning here
 
     Raises
     ------
@@ -56,48 +49,30 @@ def map_flights(
         With an EstimationError what was computed is kept in `out`, and run.json says how far.
     """
     for name in ("start", "duration"):
-        if options.get(name) is not None:
+        if getattr(settings, name) is not None:
             msg = (
                 f"--{name} with {len(flights)} flights: give it with one recording at a time, "
                 "and merge the runs"
             )
             raise UsageError(msg)
-    watch, names = progress or Progress(), flight_names(flights)
-    asked = MapOptions(map_format, map_spacing, threads, cleaning or CleanSettings())
-    settings = {
-        "flights": {n: [str(p.resolve()) for p in f] for n, f in zip(names, flights, strict=True)},
-        **plain(asked),
-        **plain(options),
-    }
-    with RunFolder(Path(out), settings) as folder:
-        runs = []
-        same = {
-            **options,
-            "map_format": map_format,
-            "map_spacing": map_spacing,
-            "cleaning": asked.cleaning,
-        }
-        for name, paths in zip(names, flights, strict=True):
-            run = Path(out) / RUNS / name
-            runs.append(run)
-            if resume and _is_mapped(run, paths, payload, same):
-                watch.note(f"{name}: is mapped already")
+    shown, names = progress or Progress(), flight_names(flights)
+    merging = merge_settings(
+        map_format=settings.map_format,
+        map_spacing=settings.map_spacing,
+        cleaning=settings.cleaning,
+        threads=settings.threads,
+        flights={n: [p.resolve() for p in f] for n, f in zip(names, flights, strict=True)},
+    )
+    with RunFolder(Path(out), merging.to_json()) as folder:
+        runs = [folder.path / RUNS / name for name in names]
+        for name, run, paths in zip(names, runs, flights, strict=True):
+            if resume and _is_mapped(run, paths, settings):
+                shown.note(f"{name}: is mapped already")
                 continue
-            watch.note(f"{name}:")
+            shown.note(f"{name}:")
             with folder.stage(f"map {name}"):
-                map_recording(
-                    paths,
-                    payload,
-                    run,
-                    map_format=map_format,
-                    map_spacing=map_spacing,
-                    cleaning=asked.cleaning,
-                    threads=threads,
-                    resume=resume,
-                    progress=watch,
-                    **options,
-                )
-        return merge_into(folder, open_sources(runs), asked, watch)
+                run_recording(paths, run, settings, payload_file, resume=resume, progress=shown)
+        return merge_into(folder, open_sources(runs), merging, shown)
 
 
 def flight_names(flights: Sequence[Sequence[Path]]) -> list[str]:
@@ -108,28 +83,15 @@ def flight_names(flights: Sequence[Sequence[Path]]) -> list[str]:
     return distinct_names(stems)
 
 
-def _is_mapped(
-    run: Path,
-    paths: Sequence[Path],
-    payload: Payload | Path | str | None,
-    options: dict[str, Any],
-) -> bool:
+def _is_mapped(run: Path, paths: Sequence[Path], settings: RunSettings) -> bool:
     """Whether a folder holds the complete run of a flight, made in the same way."""
     try:
         record = read_record(run)
     except UsageError:
         return False
-    settings = record.get("settings") or {}
-    same = all(
-        bool(settings.get(name)) == value
-        if isinstance(value, bool)
-        else settings.get(name) == plain(value)
-        for name, value in options.items()
-        if name in settings
-    )
+    wanted = {**settings.to_json(), "threads": None}
     return (
         bool(record.get("complete"))
         and record.get("recordings") == [str(path.resolve()) for path in paths]
-        and settings.get("payload") == plain(load_payload(payload))
-        and same
+        and {**(record.get("settings") or {}), "threads": None} == wanted
     )

@@ -1,35 +1,35 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""From a recording to a run folder: the whole house on one screen."""
+"""From a recording to a run folder: the whole method on one screen."""
 
 from __future__ import annotations
 
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from bentwing import odometry
-from bentwing.base.plain import plain
 from bentwing.base.progress import Progress
-from bentwing.closing.georeference import GeoreferenceSettings
 from bentwing.closing.global_registration import GlobalSettings
 from bentwing.closing.localize import read_prior_map
-from bentwing.map.clean import CleanSettings
-from bentwing.map.sample import MapSample
-from bentwing.map.writer import require_format
 from bentwing.recording import Recording
 from bentwing.recording.preprocess import RecordingPart
 from bentwing.run import stages
 from bentwing.run.checkpoint import Checkpoint
 from bentwing.run.folder import RunFolder
-from bentwing.run.report import report_run
+from bentwing.run.report import report_failure, report_run
 from bentwing.run.run import Run
-from bentwing.run.settings import described_settings, load_payload
+from bentwing.run.settings import as_run_settings
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    from bentwing.closing.georeference import GeoreferenceSettings
     from bentwing.closing.localize import PriorMap
+    from bentwing.map.clean import CleanSettings
     from bentwing.recording import Payload
+    from bentwing.run.found import Found
+    from bentwing.run.settings import EstimatorName, EstimatorSettings, MapFormat, RunSettings
 
 
 def map_recording(
@@ -37,14 +37,14 @@ def map_recording(
     payload: Payload | Path | str | None,
     out: Path | str,
     *,
-    estimator: str = "continuous",
-    map_format: str = "laz",
+    estimator: EstimatorName = "continuous",
+    map_format: MapFormat = "laz",
     map_spacing: float = 0.0,
     cleaning: CleanSettings | None = None,
     georeferencing: GeoreferenceSettings | None = None,
     loop_closure: bool = True,
     prior_map: Path | str | None = None,
-    settings: Any = None,  # noqa: ANN401 - each estimator has its own model
+    settings: EstimatorSettings | None = None,
     threads: int | None = None,
     start: float | None = None,
     duration: float | None = None,
@@ -58,15 +58,15 @@ def map_recording(
     paths : one recording, or its consecutive parts
     payload : the sensor head, or the payload.yaml that describes it
     out : the run folder; see `RunFolder` for what may be there already
-    estimator : one of `odometry.AVAILABLE_ESTIMATORS`
-    map_format : one of `MAP_FORMATS`
+    estimator : `continuous`, `kalman` or `ndt`
+    map_format : `laz`, `las`, `ply`, `pcd` or `e57`
     map_spacing : m, edge of the voxels that keep one point each; 0 keeps all points
-    cleaning : what is left out of the map; default: mixed pixels and what moved
+    cleaning : what the map leaves out; default: mixed pixels and what moved
     georeferencing : how GNSS fixes and control points are used; default: fixes, where the payload
         names their topic, as a rigid fit
     loop_closure : whether places seen again may correct the trajectory
-    prior_map : a run folder or a cloud in which the recording is found, and with which it is registered:
-        trajectory and map are then in its frame, and what has changed is written too
+    prior_map : a run folder or a cloud in which the recording is localized: trajectory and map are
+        then in its frame, and the points that have changed are written too
     settings : of the estimator; default: its defaults
     threads : of the estimator; default: all cores
     start, duration : s, the part of the recording to use; default: all of it
@@ -78,63 +78,111 @@ def map_recording(
     UsageError, InputError, EstimationError
         With an EstimationError what was computed is kept in `out`, and run.json says how far.
     """
-    require_format(map_format)
-    odometry.require_estimator(estimator)
-    head = load_payload(payload)
-    engine = odometry.create(estimator, head, settings, threads)
-    asked = {
-        "estimator": estimator,
-        "map_format": map_format,
-        "map_spacing": map_spacing,
-        "cleaning": plain(cleaning or CleanSettings()),
-        "georeferencing": plain(georeferencing or GeoreferenceSettings()),
-        "loop_closure": plain(GlobalSettings()) if loop_closure or prior_map else False,
-        "prior_map": None if prior_map is None else str(prior_map),
-        "threads": threads,
-        "start": start,
-        "duration": duration,
-        **described_settings(estimator, engine, head),
-    }
-    with Recording(paths, head) as recording, RunFolder(Path(out), asked) as folder:
-        part, run = RecordingPart(recording, head, start, duration), Run(folder.path)
-        watch = progress or Progress()
-        with _reported(folder, run):
-            with folder.stage("inputs"):
-                described = [Path(payload)] if isinstance(payload, (str, Path)) else []
-                folder.add_inputs([*recording.paths, *described])
-                prior = None if prior_map is None else _prior(Path(prior_map), folder)
-                folder.add_recordings(recording.paths, recording.clock.start_ns)
-            job = stages.Job(run, part, folder, watch, asked, prior)
+    chosen = as_run_settings(
+        payload=payload,
+        settings=settings,
+        estimator=estimator,
+        map_format=map_format,
+        map_spacing=map_spacing,
+        cleaning=cleaning,
+        georeferencing=georeferencing,
+        loop_closure=None if loop_closure else False,
+        prior_map=prior_map,
+        threads=threads,
+        start=start,
+        duration=duration,
+    )
+    described = payload if isinstance(payload, (str, Path)) else None
+    return run_recording(paths, out, chosen, described, resume=resume, progress=progress)
+
+
+def run_recording(
+    paths: Path | str | Sequence[Path | str],
+    out: Path | str,
+    settings: RunSettings,
+    payload_file: Path | str | None = None,
+    *,
+    resume: bool = False,
+    progress: Progress | None = None,
+) -> Run:
+    """Map a recording as its settings say; see `map_recording`.
+
+    Parameters
+    ----------
+    payload_file : that `settings.payload` was read from; it counts as an input
+    """
+    return finish_recording(paths, out, settings, payload_file, resume=resume, progress=progress)[0]
+
+
+def finish_recording(
+    paths: Path | str | Sequence[Path | str],
+    out: Path | str,
+    settings: RunSettings,
+    payload_file: Path | str | None = None,
+    *,
+    resume: bool = False,
+    progress: Progress | None = None,
+) -> tuple[Run, Found]:
+    """Return the run, and what its stages have found: a sample of the map, the spin of the head."""
+    with (
+        Recording(paths, settings.payload) as recording,
+        RunFolder(Path(out), settings.to_json()) as folder,
+    ):
+        part = RecordingPart(recording, settings.payload, settings.start, settings.duration)
+        job = stages.Job(part, folder, settings, progress or Progress())
+        with _reported(folder):
+            job = replace(job, prior=_open_inputs(job, payload_file))
             checkpoint = Checkpoint(folder)
-            done = checkpoint.restore(run) if resume else None
+            done, found = checkpoint.restore(resume=resume)
             if done is None:
-                stages.estimate(job, engine)
-                checkpoint.save("estimate", run)
-            if (loop_closure or prior) and done != "loops":
-                stages.register(job)
-                checkpoint.save("loops", run)
-            placed = stages.put_on_earth(job)
-            stages.write_map(job, placed)
-            with folder.stage("report"):
-                folder.save()
-                report_run(folder, run, complete=True)
+                engine = odometry.create(
+                    settings.estimator, settings.payload, settings.of_estimator, settings.threads
+                )
+                found = _keep(job, stages.estimate(job, engine), found.notes, open_loop=True)
+                checkpoint.save("estimate", found)
+            if settings.closes_loops and done != "loops":
+                found = _keep(job, stages.close(job, found))
+                checkpoint.save("loops", found)
+            found = _keep(job, stages.place_on_earth(job, found))
+            found = _keep(job, stages.make_map(job, found))
+            report_run(folder, found)
             checkpoint.discard()
-    return run
+    return Run.of(folder.path, found), found
 
 
-def _prior(path: Path, folder: RunFolder) -> PriorMap:
-    prior = read_prior_map(path, GlobalSettings().surfels)
-    folder.add_inputs([prior.file])
-    return prior
+def _open_inputs(job: stages.Job, payload_file: Path | str | None) -> PriorMap | None:
+    """Record what the run reads; return the prior map."""
+    folder, recording, prior = job.folder, job.part.recording, job.settings.prior_map
+    with folder.stage("inputs"):
+        described = [] if payload_file is None else [Path(payload_file)]
+        folder.add_inputs([*recording.paths, *described])
+        known = None if prior is None else read_prior_map(prior, GlobalSettings().surfels)
+        if known is not None:
+            folder.add_inputs([known.file])
+        folder.add_recordings(recording.paths, recording.clock.start_ns)
+    return known
+
+
+def _keep(
+    job: stages.Job, found: Found, notes: Sequence[str] = (), *, open_loop: bool = False
+) -> Found:
+    """Write the trajectory and record what was found; raise if the stage did not finish."""
+    found = replace(found, notes=(*notes, *found.notes))
+    before, job.folder.record.found = job.folder.record.found, found
+    if found.estimate is not None and open_loop:
+        job.folder.write_trajectory("odometry.txt", found.estimate, job.origin_ns)
+    if found.failure is not None:
+        raise found.failure
+    if found.estimate is not None and found.estimate is not before.estimate:
+        job.folder.write_trajectory("trajectory.txt", found.estimate, job.origin_ns)
+    return found
 
 
 @contextmanager
-def _reported(folder: RunFolder, run: Run) -> Iterator[None]:
-    """Write a report without a map when the run fails, so that none of an earlier run remains."""
+def _reported(folder: RunFolder) -> Iterator[None]:
+    """Report a failure before it leaves."""
     try:
         yield
     except BaseException as error:
-        folder.fail(error)
-        run.sample = MapSample()
-        report_run(folder, run, complete=False)
+        report_failure(folder, error)
         raise

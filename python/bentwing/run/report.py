@@ -3,30 +3,56 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bentwing.base.trajectory import Trajectory
 from bentwing.report.page import write_report
 from bentwing.report.picture import render_top, write_png
 from bentwing.report.views import overhead_points
 
 if TYPE_CHECKING:
     from bentwing.run.folder import RunFolder
-    from bentwing.run.run import Run
+    from bentwing.run.found import Found
 
 
-def report_run(folder: RunFolder, run: Run, *, complete: bool) -> None:
-    """Write report.html and, where there is a map, map_top.png."""
-    points, times = run.sample.points, run.sample.times
+_NOWHERE = Trajectory(np.empty(0), np.empty((0, 3)), np.empty((0, 4)))
+
+
+def report_run(folder: RunFolder, found: Found, trajectory: Trajectory | None = None) -> None:
+    """Write report.html and map_top.png of a run whose other stages are done.
+
+    Parameters
+    ----------
+    trajectory : of the map; default: of the estimate
+    """
+    with folder.stage("report"):
+        folder.save()
+        _write(folder, found, trajectory, complete=True)
+
+
+def report_failure(folder: RunFolder, error: BaseException) -> None:
+    """Write a report without a map, so that none of an earlier run remains."""
+    folder.fail(error)
+    _write(folder, replace(folder.record.found, map=None), None, complete=False)
+
+
+def _write(
+    folder: RunFolder, found: Found, trajectory: Trajectory | None, *, complete: bool
+) -> None:
+    if trajectory is None:
+        trajectory = _NOWHERE if found.estimate is None else found.estimate.trajectory
+    points, times = found.sample.points, found.sample.times
     write_report(
         folder.file("report.html"),
-        run_json={**folder.record, "complete": complete},
-        trajectory=run.trajectory,
+        run_json={**folder.described(), "complete": complete},
+        trajectory=trajectory,
         map_sample=(points, times),
-        spin=(np.array(run.spin_times), np.array(run.spin_rates)) if run.spin_times else None,
+        spin=found.spin.series,
     )
     if len(points):
-        overhead = overhead_points(points, times, run.trajectory)
+        overhead = overhead_points(points, times, trajectory)
         seen = points[~overhead] if overhead.any() else points
         write_png(folder.file("map_top.png"), render_top(seen))

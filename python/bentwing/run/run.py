@@ -1,52 +1,109 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""What a run has found."""
+"""A finished run as a value."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from bentwing.base.trajectory import Trajectory
-from bentwing.map.sample import MapSample
-from bentwing.recording import ImuBatch
+from bentwing.base.errors import InputError, UsageError
+from bentwing.base.estimate import Estimate
+from bentwing.base.run_record import read_record
+from bentwing.base.trajectory import DT, read_tum
+from bentwing.odometry.segments import joined
+from bentwing.run.checkpoint import read_calibration
 
 if TYPE_CHECKING:
-    from pathlib import Path
+    from collections.abc import Mapping
 
-    from bentwing.base.estimate import Estimate
-    from bentwing.recording import Batch
+    from bentwing.base.trajectory import Trajectory
+    from bentwing.run.found import Found
+
+_ROUNDED = 1e-6  # s; stamps in files are rounded to the nanosecond
 
 
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True)
 class Run:
-    """What a run has found so far; complete when `map_recording` returns.
+    """A finished run.
 
     Attributes
     ----------
     out : the run folder
-    estimate : trajectory, calibration and diagnostics; None before there are any
-    sample : evenly chosen points of the map
-    spin_times, spin_rates : s and rad/s, rate of turn of the IMU, about ten a second
+    estimate : trajectory, calibration and diagnostics
+    warnings : sentences about the health of the result
+    map_path : the map
+    report_path : the report
     """
 
     out: Path
-    estimate: Estimate | None = None
-    sample: MapSample = field(default_factory=MapSample)
-    spin_times: list[float] = field(default_factory=list)
-    spin_rates: list[float] = field(default_factory=list)
+    estimate: Estimate
+    warnings: tuple[str, ...]
+    map_path: Path
+    report_path: Path
 
     @property
     def trajectory(self) -> Trajectory:
-        """Poses of the IMU in the map; empty before there are any."""
-        return _NO_TRAJECTORY if self.estimate is None else self.estimate.trajectory
+        """Poses of the IMU in the map."""
+        return self.estimate.trajectory
 
-    def watch(self, batch: Batch) -> None:
-        """Note the rate of turn of an IMU batch."""
-        if isinstance(batch, ImuBatch) and len(batch.times):
-            self.spin_times.append(float(batch.times.mean()))
-            self.spin_rates.append(float(np.median(np.linalg.norm(batch.gyro, axis=1))))
+    @classmethod
+    def of(cls, out: Path, found: Found) -> Run:
+        """Return the run whose stages have found this."""
+        if found.estimate is None or found.map is None:
+            msg = "found: expected the result of all stages, got one without estimate or map"
+            raise ValueError(msg)
+        return cls(out, found.estimate, tuple(found.warnings), found.map.path, out / "report.html")
+
+    @classmethod
+    def load(cls, out: Path | str) -> Run:
+        """Read a finished run back from its folder.
+
+        Stamps and poses are rounded as in trajectory.txt.
+
+        Raises
+        ------
+        UsageError
+            If the folder holds no run, a merged map, or a run that is not complete.
+        InputError
+            If its trajectory cannot be read.
+        """
+        folder = Path(out)
+        record = require_single(folder, read_record(folder))
+        written = next(name for name in record["files"] if name.startswith("map."))
+        return cls(
+            folder,
+            estimate_of(folder, record),
+            tuple(record["warnings"]),
+            folder / written,
+            folder / "report.html",
+        )
 
 
-_NO_TRAJECTORY = Trajectory(np.empty(0), np.empty((0, 3)), np.empty((0, 4)))
+def require_single(folder: Path, record: dict[str, Any]) -> dict[str, Any]:
+    """Return the record of a run that is complete and no merged one, or raise UsageError."""
+    if record.get("runs"):
+        of = ", ".join(str(run.get("folder")) for run in record["runs"])
+        msg = f"{folder}: holds a merged map; give the runs that it was made of ({of}) instead"
+        raise UsageError(msg)
+    if not record.get("complete"):
+        msg = f"{folder}: the run is not complete; finish it with `bentwing map ... --resume` first"
+        raise UsageError(msg)
+    return record
+
+
+def estimate_of(folder: Path, record: Mapping[str, Any]) -> Estimate:
+    """Return the estimate of a complete run from its folder and record."""
+    poses, _ = read_tum(folder / "trajectory.txt", int(record["start_ns"]))
+    spans = record.get("segments") or [[float(poses.times[0]), float(poses.times[-1])]]
+    cut = [poses.within([(a - _ROUNDED, b + _ROUNDED)]) for a, b in spans]
+    segments = [part for part in cut if len(part.times) > 1]
+    if not segments:
+        msg = f"{folder / 'trajectory.txt'}: does not cover the segments in run.json; map it again"
+        raise InputError(msg)
+    return Estimate(
+        joined(segments, DT),
+        read_calibration(record["calibration"]),
+        windows=record.get("windows") or [],
+        segments=[(float(part.times[0]), float(part.times[-1])) for part in segments],
+    )

@@ -1,20 +1,130 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""What decides a run, defaults included: the estimator's settings and the sensor head."""
+"""What decides a result: the settings of a run and of a merging, defaults included."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from pathlib import Path  # noqa: TC003 - pydantic reads the annotations
+from typing import Any, Literal, TypeVar
 
 import yaml
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
-from bentwing import odometry
+from bentwing.base.errors import UsageError
 from bentwing.base.plain import plain
+from bentwing.closing.georeference.settings import GeoreferenceSettings
+from bentwing.closing.global_registration.settings import GlobalSettings
+from bentwing.map.clean import CleanSettings
+from bentwing.map.writer import require_format
+from bentwing.odometry import ESTIMATORS, require_estimator
+from bentwing.odometry.continuous.settings import ContinuousSettings
+from bentwing.odometry.kalman.settings import KalmanSettings
+from bentwing.odometry.ndt.settings import NdtSettings
 from bentwing.recording import Payload
 
-if TYPE_CHECKING:
-    from pathlib import Path
+EstimatorName = Literal["continuous", "kalman", "ndt"]
+MapFormat = Literal["laz", "las", "ply", "pcd", "e57"]
+_Model = TypeVar("_Model", bound=BaseModel)
+EstimatorSettings = ContinuousSettings | KalmanSettings | NdtSettings
 
-    from bentwing.odometry.interface import Estimator
+
+class MapSettings(BaseModel):
+    """How a map is written, of one run or of several."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    map_format: MapFormat = Field("laz", description="file format of the map")
+    map_spacing: float = Field(
+        0.0, ge=0, description="edge of the voxels that keep one point each, m; 0 keeps all points"
+    )
+    cleaning: CleanSettings = Field(CleanSettings(), description="what the map leaves out")
+    threads: int | None = Field(None, ge=1, description="default: all cores")
+
+    @field_validator("map_format", mode="before")
+    @classmethod
+    def _can_be_written(cls, name: str) -> str:
+        require_format(name)
+        return name
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the settings in plain JSON types, as run.json has them."""
+        described: dict[str, Any] = plain(self)
+        return described
+
+
+class MergeSettings(MapSettings):
+    """What decides a merged map.
+
+    Attributes
+    ----------
+    runs : folders of the runs
+    flights : files of each flight by its name, where the flights are mapped first
+    """
+
+    runs: tuple[Path, ...] = ()
+    flights: dict[str, tuple[Path, ...]] = Field(default_factory=dict)
+
+
+class RunSettings(MapSettings):
+    """What decides a run.
+
+    `continuous`, `kalman` and `ndt` are the settings of the estimators; those of `estimator` count.
+    """
+
+    estimator: EstimatorName = Field("continuous", description="name of the estimator")
+    georeferencing: GeoreferenceSettings = Field(
+        GeoreferenceSettings(), description="how GNSS fixes and control points are used"
+    )
+    loop_closure: GlobalSettings | Literal[False] = Field(
+        GlobalSettings(), description="how loops are closed; false leaves the trajectory open-loop"
+    )
+    prior_map: Path | None = Field(None, description="map in which the recording is localized")
+    start: float | None = Field(None, ge=0, description="of the part to use, s")
+    duration: float | None = Field(None, ge=0, description="of the part to use, s")
+    continuous: ContinuousSettings = ContinuousSettings()
+    kalman: KalmanSettings = KalmanSettings()
+    ndt: NdtSettings = NdtSettings()
+    payload: Payload = Field(default_factory=Payload.default)
+
+    @field_validator("estimator", mode="before")
+    @classmethod
+    def _is_known(cls, name: str) -> str:
+        require_estimator(name)
+        return name
+
+    @property
+    def of_estimator(self) -> EstimatorSettings:
+        """Settings of the estimator that is used."""
+        chosen: EstimatorSettings = getattr(self, self.estimator)
+        return chosen
+
+    @property
+    def closes_loops(self) -> bool:
+        """Whether the trajectory is corrected by places seen again, or by a given map."""
+        return self.loop_closure is not False or self.prior_map is not None
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the settings in plain JSON types, without those of other estimators."""
+        described = super().to_json()
+        return {k: v for k, v in described.items() if k == self.estimator or k not in ESTIMATORS}
+
+    def to_yaml(self) -> str:
+        """Return the settings as text that `from_yaml` reads."""
+        return yaml.safe_dump(self.to_json(), sort_keys=False)
+
+
+def as_run_settings(
+    *,
+    estimator: str,
+    payload: Payload | Path | str | None,
+    settings: EstimatorSettings | None,
+    **values: Any,  # noqa: ANN401 - the model checks them
+) -> RunSettings:
+    """Return the settings of a run from the arguments of a call, in which None is the default."""
+    require_estimator(estimator)
+    given = {name: value for name, value in values.items() if value is not None}
+    if settings is not None:
+        given[estimator] = settings
+    return run_settings(estimator=estimator, payload=load_payload(payload), **given)
 
 
 def load_payload(payload: Payload | Path | str | None) -> Payload:
@@ -24,14 +134,28 @@ def load_payload(payload: Payload | Path | str | None) -> Payload:
     return Payload.default() if payload is None else Payload.load(payload)
 
 
-def described_settings(estimator: str, engine: Estimator, payload: Payload) -> dict[str, Any]:
-    """Return the settings of an estimator, and the payload, in plain JSON types."""
-    return {estimator: plain(getattr(engine, "settings", None)), "payload": plain(payload)}
+def run_settings(**values: Any) -> RunSettings:  # noqa: ANN401 - the model checks them
+    """Return the settings of a run.
+
+    Raises
+    ------
+    UsageError
+        If a value is not possible; the sentence names it.
+    """
+    return _validated(RunSettings, values)
 
 
-def settings_text(estimator: str, payload: Payload | Path | str | None) -> str:
-    """Return what a run with this payload would use, as YAML."""
-    odometry.require_estimator(estimator)
-    head = load_payload(payload)
-    engine = odometry.create(estimator, head, None, None)
-    return yaml.safe_dump(described_settings(estimator, engine, head), sort_keys=False)
+def merge_settings(**values: Any) -> MergeSettings:  # noqa: ANN401 - the model checks them
+    """Return the settings of a merging; raises as `run_settings` does."""
+    return _validated(MergeSettings, values)
+
+
+def _validated(model: type[_Model], values: dict[str, Any]) -> _Model:
+    try:
+        return model.model_validate(values)
+    except ValidationError as error:
+        found = [
+            f"{'.'.join(map(str, e['loc']))}: {e['msg']}, found {e['input']!r}"
+            for e in error.errors(include_url=False)
+        ]
+        raise UsageError("; ".join(found)) from None

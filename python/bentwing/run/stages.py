@@ -1,58 +1,51 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""The stages of a run: each takes what the run has found so far and adds to it."""
+"""The stages of a run: each takes what was found so far and returns it with one thing more."""
 
 from __future__ import annotations
 
 from collections import Counter
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from bentwing.base.errors import EstimationError, NotEnoughDataError
 from bentwing.base.progress import Progress
-from bentwing.closing.georeference import Georeferenced, GeoreferenceSettings, georeference
+from bentwing.closing.georeference import georeference
 from bentwing.closing.global_registration import Budget, GlobalSettings, close_loops
 from bentwing.closing.joining.segments import close_segments
 from bentwing.closing.localize import Difference, NotInMapError, find_in_map
-from bentwing.map.chunk import untimed
-from bentwing.map.clean import CleanSettings, clean
 from bentwing.map.project import project
-from bentwing.map.thin import thin
-from bentwing.map.writer import open_map
-from bentwing.odometry.segments import GUESSED
+from bentwing.run.found import Found, Reading, Spin
+from bentwing.run.mapping import MapSource, write_map
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from bentwing.base.estimate import Estimate
     from bentwing.base.progress import Stage
-    from bentwing.closing.global_registration import Closed
-    from bentwing.closing.localize import GivenCoordinates, PriorMap
+    from bentwing.closing.localize import PriorMap
     from bentwing.map.chunk import MapChunk
     from bentwing.odometry.interface import Estimator
     from bentwing.recording.preprocess import RecordingPart
     from bentwing.run.folder import RunFolder
-    from bentwing.run.run import Run
-
-    Placed = Georeferenced | GivenCoordinates
+    from bentwing.run.settings import RunSettings
 
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """A run and what its stages work with.
+    """What the stages of a run work with.
 
     Attributes
     ----------
-    run : what was found so far
-    asked : the settings as run.json has them
-    prior : the map it is found in, if there is one
+    part : of the recording
+    folder : times the stages and has room for their files
+    prior : the map in which the recording is localized, if there is one
     """
 
-    run: Run
     part: RecordingPart
     folder: RunFolder
-    watch: Progress
-    asked: dict[str, Any]
+    settings: RunSettings
+    progress: Progress
     prior: PriorMap | None = None
 
     @property
@@ -60,167 +53,128 @@ class Job:
         """Absolute time of the recording's start, ns UTC."""
         return self.part.recording.clock.start_ns
 
-    def write_trajectory(self, name: str, estimate: Estimate) -> None:
-        """Write trajectory.txt or odometry.txt."""
-        self.folder.write_trajectory(name, estimate, self.origin_ns)
 
-
-def estimate(job: Job, engine: Estimator) -> None:
-    """Find the open-loop trajectory and the calibration."""
-    run, part, folder, counts = job.run, job.part, job.folder, Counter[str]()
-    with folder.stage("estimate"), job.watch.stage("estimate", part.length) as shown:
+def estimate(job: Job, engine: Estimator) -> Found:
+    """Find the open-loop trajectory and the calibration; with a failure, as far as they go."""
+    part, counts, spin = job.part, Counter[str](), Spin()
+    failure: BaseException | None = None
+    found: Estimate | None = None
+    with job.folder.stage("estimate"), job.progress.stage("estimate", part.length) as shown:
         try:
             for batch in part.batches(shown, counts):
                 engine.feed(batch)
-                run.watch(batch)
-            run.estimate = engine.result()
-        except (EstimationError, KeyboardInterrupt):
-            with suppress(EstimationError):  # there may be nothing yet
-                run.estimate = engine.so_far()
-            raise
-        finally:
-            # also of a failure: the trajectory up to there shows where it went wrong
-            folder.record["counts"].update(part.recording.counts + counts)
-            folder.record["warnings"] += part.recording.warnings
-            if run.estimate is not None:
-                folder.add_estimate(run.estimate)
-                job.write_trajectory("odometry.txt", run.estimate)
-        job.write_trajectory("trajectory.txt", run.estimate)
+                spin.watch(batch)
+            found = engine.result()
+        except BaseException as error:
+            failure = error
+            if isinstance(error, (EstimationError, KeyboardInterrupt)):
+                with suppress(EstimationError):  # there may be nothing yet
+                    found = engine.so_far()
+    reading = Reading(dict(part.recording.counts + counts), list(part.recording.warnings))
+    return Found(found, reading, spin, failure=failure)
 
 
-def register(job: Job) -> None:
-    """Correct the trajectory by all that was seen more than once, or that a map shows already."""
-    found, folder, part = job.run.estimate, job.folder, job.part
-    if found is None:
-        return
+def close(job: Job, found: Found) -> Found:
+    """Correct the trajectory by all that was seen more than once, or that a prior map shows."""
+    open_loop, part, threads = _known(found), job.part, job.settings.threads
     budget = Budget.of(part.length, GlobalSettings())
-    job.watch.note(f"loops: {budget.sentence()}")
+    job.progress.note(f"loops: {budget.sentence()}")
     if job.prior is not None:
-        found = _localized(job, found, job.prior)
-    with folder.stage("loops"), job.watch.stage("loops", part.length) as shown:
-        closed = _closed(job, found, budget, shown)
-    job.run.estimate = closed.estimate
-    folder.record["loop_closure"] = closed.record
-    folder.add_estimate(closed.estimate)
-    job.write_trajectory("trajectory.txt", closed.estimate)
+        found = _localize(job, found, job.prior)
+        if found.failure is not None:
+            return found
+        open_loop = _known(found)
+    with job.folder.stage("loops"), job.progress.stage("loops", part.length) as shown:
+        batches = part.batches(shown, Counter())  # the first pass has counted what is dropped
+        if len(open_loop.segments) > 1 and job.prior is None:
+            closed, merging = close_segments(
+                open_loop, batches, part.payload, budget=budget, threads=threads
+            )
+            found = replace(found, merging=merging)
+        else:
+            near = None if job.prior is None else job.prior.surfels_near(open_loop.trajectory)
+            closed = close_loops(
+                open_loop, batches, part.payload, budget=budget, known=near, threads=threads
+            )
+    return replace(found, estimate=closed.estimate, loop_closure=closed.record)
 
 
-def _localized(job: Job, open_loop: Estimate, prior: PriorMap) -> Estimate:
-    threads, part = job.asked["threads"], job.part
-    with job.folder.stage("localize"), job.watch.stage("localize", part.length) as shown:
+def _localize(job: Job, found: Found, prior: PriorMap) -> Found:
+    part = job.part
+    with job.folder.stage("localize"), job.progress.stage("localize", part.length) as shown:
+        batches = part.batches(shown, Counter())
         try:
-            found = find_in_map(open_loop, part.batches(shown, Counter()), prior, threads=threads)
+            there = find_in_map(_known(found), batches, prior, threads=job.settings.threads)
         except NotInMapError as error:
-            job.folder.record["localization"] = error.record
-            raise
-    job.folder.record["localization"] = found.record
-    return found.estimate
+            return replace(found, localization=error.record, failure=error)
+    return replace(found, estimate=there.estimate, localization=there.record)
 
 
-def _closed(job: Job, found: Estimate, budget: Budget, shown: Stage) -> Closed:
-    threads, payload = job.asked["threads"], job.part.payload
-    batches = job.part.batches(shown, Counter())  # what is dropped was counted in the first pass
-    if len(found.segments) > 1 and job.prior is None:
-        closed, job.folder.record["merging"] = close_segments(
-            found, batches, payload, budget=budget, threads=threads
-        )
-        # Breaks that were healed are none; what is true now comes with the estimate.
-        job.folder.record["warnings"] = [
-            w
-            for w in job.folder.record["warnings"]
-            if GUESSED not in w or w in closed.estimate.warnings
-        ]
-        return closed
-    known = None if job.prior is None else job.prior.surfels_near(found.trajectory)
-    return close_loops(found, batches, payload, budget=budget, known=known, threads=threads)
-
-
-def put_on_earth(job: Job) -> Placed | None:
-    """Find where on the Earth the map is; one that has no place there is still a map."""
-    found, part, folder = job.run.estimate, job.part, job.folder
-    if found is None:
-        return None
+def place_on_earth(job: Job, found: Found) -> Found:
+    """Find where on the Earth the map is; without that it stays in its own frame."""
+    estimate, part, settings = _known(found), job.part, job.settings.georeferencing
     if job.prior is not None:
-        given = job.prior.coordinates
-        folder.record["georeference"] = None if given is None else given.record
-        return given
-    gnss, settings = part.payload.gnss, GeoreferenceSettings(**job.asked["georeferencing"])
+        return replace(found, placed=job.prior.coordinates)
+    gnss = part.payload.gnss
     if gnss is None and settings.control_points is None:
-        return None
-    with folder.stage("georeference"), Progress().stage("", part.length) as unseen:
+        return found
+    with job.folder.stage("georeference"), Progress().stage("", part.length) as unseen:
         try:
             placed = georeference(
-                found.trajectory,
+                estimate.trajectory,
                 None if gnss is None else part.recording.fixes(part.start, part.duration),
                 settings,
                 lever_arm=(0.0, 0.0, 0.0) if gnss is None else gnss.lever_arm,
-                segments=found.segments,
+                segments=estimate.segments,
                 reach=part.payload.lidar.max_range,
-                chunks=lambda: _projected(job, found, unseen, {}),
+                chunks=lambda: _chunks(job, estimate, unseen, {}),
             )
         except NotEnoughDataError as error:
-            folder.record["warnings"].append(f"{error}; the map stays in its own frame")
-            return None
-    if placed is not None:
-        folder.record["georeference"] = placed.record
-        folder.record["warnings"] += placed.warnings
-        if placed.trajectory is not found.trajectory:
-            job.run.estimate = replace(found, trajectory=placed.trajectory)
-            job.write_trajectory("trajectory.txt", job.run.estimate)
-    return placed
+            note = f"{error}; the map stays in its own frame"
+            return replace(found, notes=(*found.notes, note))
+    if placed is None:
+        return found
+    if placed.trajectory is not estimate.trajectory:
+        estimate = replace(estimate, trajectory=placed.trajectory)
+    notes = (*found.notes, *placed.warnings)
+    return replace(found, estimate=estimate, placed=placed, notes=notes)
 
 
-def write_map(job: Job, placed: Placed | None) -> None:
-    """Write the cleaned and thinned map, and what has changed since the one it was found in."""
-    found, folder, map_format = job.run.estimate, job.folder, job.asked["map_format"]
-    if found is None:
-        return
-    counts, path = folder.record["counts"], folder.file(f"map.{map_format}")
-    difference = None if job.prior is None else Difference(job.prior.cloud, found.trajectory)
-    with folder.stage("map"), job.watch.stage("map", job.part.length) as shown:
-        chunks = clean(
-            _projected(job, found, shown, counts),
-            path,
-            duration=job.part.length,
-            settings=CleanSettings(**job.asked["cleaning"]),
-            counts=counts,
-            record=folder.record["map"],
-            threads=job.asked["threads"],
+def make_map(job: Job, found: Found) -> Found:
+    """Write the map, and what has changed since the prior map."""
+    estimate, prior, part = _known(found), job.prior, job.part
+    difference = None if prior is None else Difference(prior.cloud, estimate.trajectory)
+    with job.folder.stage("map"), job.progress.stage("map", part.length) as shown:
+        written = write_map(
+            job.folder,
+            [
+                MapSource(
+                    estimate, job.origin_ns, lambda counts: _chunks(job, estimate, shown, counts)
+                )
+            ],
+            job.settings,
+            duration=part.length,
+            placed=found.placed,
+            difference=difference,
         )
-        if difference is not None:
-            chunks = difference.watch(chunks)
-        chunks = thin(chunks, job.asked["map_spacing"], counts)
-        crs_wkt = None if placed is None else placed.crs_wkt
-        with open_map(path, map_format, job.origin_ns, crs_wkt) as writer:
-            for chunk in job.run.sample.watch(chunks):
-                if placed is not None:
-                    chunk = replace(chunk, points=placed.to_projected(chunk.points))
-                writer.write(chunk)
-        counts["map.written"] = writer.n_points
-        if difference is not None:
-            _write_changes(job, difference, placed)
+    return replace(found, map=written)
 
 
-def _write_changes(job: Job, difference: Difference, placed: Placed | None) -> None:
-    map_format = job.asked["map_format"]
-    job.folder.record["localization"] |= difference.record
-    clouds = {"appeared": difference.appeared, "disappeared": difference.disappeared}
-    for name, points in clouds.items():
-        path = job.folder.file(f"{name}.{map_format}")
-        with open_map(
-            path, map_format, job.origin_ns, None if placed is None else placed.crs_wkt
-        ) as writer:
-            writer.write(untimed(points if placed is None else placed.to_projected(points)))
+def _known(found: Found) -> Estimate:
+    if found.estimate is None:
+        msg = "found.estimate: expected the estimate of an earlier stage, got None"
+        raise ValueError(msg)
+    return found.estimate
 
 
-def _projected(
-    job: Job, found: Estimate, shown: Stage, counts: dict[str, int]
+def _chunks(
+    job: Job, estimate: Estimate, shown: Stage, counts: dict[str, int]
 ) -> Iterator[MapChunk]:
     return project(
-        job.part.batches(shown, Counter()),  # what is dropped was counted in the first pass
-        found.trajectory,
-        found.calibration,
-        segments=found.segments,
-        threads=job.asked["threads"],
+        job.part.batches(shown, Counter()),  # the first pass has counted what is dropped
+        estimate.trajectory,
+        estimate.calibration,
+        segments=estimate.segments,
+        threads=job.settings.threads,
         counts=counts,
     )

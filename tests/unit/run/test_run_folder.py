@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from bentwing.base import run_record
+from bentwing.base import provenance
 from bentwing.base.atomic import write_text
 from bentwing.base.calibration import Calibration
 from bentwing.base.errors import EstimationError, UsageError
@@ -16,6 +16,7 @@ from bentwing.base.provenance import describe_input
 from bentwing.base.run_record import read_record
 from bentwing.base.trajectory import Trajectory
 from bentwing.run.folder import RunFolder
+from bentwing.run.found import Found
 
 
 def record_of(out):
@@ -40,7 +41,7 @@ def test_a_run_that_ends_well_is_complete_and_names_its_files(tmp_path):
     with RunFolder(out, {"estimator": "continuous"}) as run:
         assert record_of(out)["complete"] is False
         with run.stage("estimate"):
-            run.add_estimate(estimate())
+            run.record.found = Found(estimate())
         run.write_trajectory("trajectory.txt", estimate(), 0)
     record = record_of(out)
     assert (record["complete"], record["stage"], record["reason"]) == (True, "done", None)
@@ -147,7 +148,7 @@ def test_inputs_are_named_with_size_and_hash(tmp_path, monkeypatch):
     found = describe_input(tmp_path / "bag" / "a.mcap")
     assert found["sha256"] == hashlib.sha256(content).hexdigest()
     assert (found["name"], found["bytes"], found["hashed"]) == ("a.mcap", len(content), "all")
-    monkeypatch.setattr(run_record, "FULL_HASH_LIMIT", 2**22)
+    monkeypatch.setattr(provenance, "FULL_HASH_LIMIT", 2**22)
     ends = hashlib.sha256(content[: 2**20] + content[-(2**20) :]).hexdigest()
     with RunFolder(tmp_path / "out") as run:
         run.add_inputs([tmp_path / "bag"])

@@ -3,32 +3,36 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bentwing.base.errors import UsageError
-from bentwing.base.estimate import Estimate
 from bentwing.base.run_record import RECORD, read_record
 from bentwing.base.trajectory import DT
 from bentwing.closing.global_registration import Recorded, register_jointly
 from bentwing.closing.global_registration.stretches import Stretches
 from bentwing.closing.joining.matches import Match, Part
+from bentwing.map.project import project
 from bentwing.odometry.segments import joined
 from bentwing.run.folder import RunFolder
-from bentwing.run.merging.writing import one_after_the_other, write_map, write_trajectories
+from bentwing.run.found import Found
+from bentwing.run.mapping import MapSource, joined_trajectory, write_map
+from bentwing.run.merging.trajectories import write_trajectories
 from bentwing.run.report import report_run
-from bentwing.run.run import Run
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
+    from bentwing.base.estimate import Estimate
     from bentwing.base.progress import Progress
     from bentwing.closing.joining.placing import Placed
     from bentwing.closing.joining.survey import Survey
+    from bentwing.map.chunk import MapChunk
     from bentwing.run.merging.source import Source
-    from bentwing.run.merging.writing import MapOptions
+    from bentwing.run.settings import MergeSettings
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,58 +53,57 @@ class MergedMap:
 
 @dataclass(frozen=True, slots=True)
 class Ingredients:
-    """What all maps are made of."""
+    """What all maps are made of.
+
+    Attributes
+    ----------
+    matches : of places, all of them
+    record : what run.json says about them
+    """
 
     sources: list[Source]
     surveys: list[Survey]
-    options: MapOptions
-    watch: Progress
+    matches: list[Match]
+    record: Mapping[str, Any]
+    settings: MergeSettings
+    progress: Progress
 
 
-def make_maps(
-    folder: RunFolder, groups: Sequence[Placed], matches: list[Match], found: Ingredients
-) -> list[MergedMap]:
+def make_maps(folder: RunFolder, groups: Sequence[Placed], found: Ingredients) -> list[MergedMap]:
     """Make the map of each group: in the folder, or where there are several in sub-folders.
 
     Parameters
     ----------
-    folder : whose record has `merging`, with a list `maps` that is filled
     groups : of parts that belong together
-    matches : all of them
     """
-    record = folder.record["merging"]
     if len(groups) > 1:
-        maps = _separate_maps(folder, record, groups, matches, found)
+        maps = _separate_maps(folder, groups, found)
     else:
-        names = [source.name for source in found.sources]
-        _add_map(record, ".", groups[0], names, matches)
-        folder.record["warnings"] += _warnings(groups[0], found.sources, matches)
-        maps = [_one_map(folder, groups[0], found)]
+        maps = [_one_map(folder, groups[0], found, _describe(".", groups[0], found))]
     _remove_earlier_maps(folder.path, {one.out.name for one in maps})
     return maps
 
 
-def _add_map(
-    record: dict[str, Any], where: str, group: Placed, names: Sequence[str], matches: list[Match]
-) -> None:
+def _describe(where: str, group: Placed, found: Ingredients) -> dict[str, Any]:
     """Say what a map consists of."""
-    runs = sorted({part.run for part in group.trajectories})
-    links = [m for m in matches if m.believed and m.a in group.trajectories]
-    record["maps"].append(
-        {
-            "folder": where,
-            "runs": [names[run] for run in runs],
-            "n_links": len(links),
-            "graph": group.record,
-        }
-    )
+    links = [m for m in found.matches if m.believed and m.a in group.trajectories]
+    return {
+        "folder": where,
+        "runs": [found.sources[run].name for run in _numbers(group)],
+        "n_links": len(links),
+        "graph": group.record,
+    }
 
 
-def _warnings(group: Placed, sources: Sequence[Source], matches: Sequence[Match]) -> list[str]:
+def _numbers(group: Placed) -> list[int]:
+    return sorted({part.run for part in group.trajectories})
+
+
+def _warnings(group: Placed, found: Ingredients) -> list[str]:
     """Return those of the runs in a group, and where a run hangs by one place only."""
-    runs = sorted({part.run for part in group.trajectories})
+    sources, runs = found.sources, _numbers(group)
     told = [f"{sources[run].name}: {warning}" for run in runs for warning in sources[run].warnings]
-    believed = [m for m in matches if m.believed and m.a.run != m.b.run]
+    believed = [m for m in found.matches if m.believed and m.a.run != m.b.run]
     for run in runs:
         links = [m for m in believed if run in {m.a.run, m.b.run}]
         if len(links) == 1:
@@ -113,32 +116,23 @@ def _warnings(group: Placed, sources: Sequence[Source], matches: Sequence[Match]
 
 
 def _separate_maps(
-    folder: RunFolder,
-    record: dict[str, Any],
-    groups: Sequence[Placed],
-    matches: list[Match],
-    found: Ingredients,
+    folder: RunFolder, groups: Sequence[Placed], found: Ingredients
 ) -> list[MergedMap]:
-    names = [source.name for source in found.sources]
-    maps, told = [], []
+    maps, described = [], []
     for number, group in enumerate(groups, start=1):
-        name = f"map_{number}"
-        _add_map(record, name, group, names, matches)
-        told.append(f"{name} ({', '.join(record['maps'][-1]['runs'])})")
-        with RunFolder(folder.path / name, folder.record["settings"]) as own:
-            own.record["warnings"] += _warnings(group, found.sources, matches)
-            own.record["merging"] = {**record, "maps": record["maps"][-1:]}
-            numbers = {part.run for part in group.trajectories}
-            own.add_inputs([p for n in sorted(numbers) for p in found.sources[n].recordings])
-            maps.append(_one_map(own, group, found))
-    folder.record["warnings"].append(
+        one = _describe(f"map_{number}", group, found)
+        described.append(one)
+        with RunFolder(folder.path / one["folder"], folder.record.settings) as own:
+            sources = [found.sources[n] for n in _numbers(group)]
+            own.add_inputs([path for source in sources for path in source.recordings])
+            maps.append(_one_map(own, group, found, one))
+    told = ", ".join(f"{one['folder']} ({', '.join(one['runs'])})" for one in described)
+    note = (
         "not all of the runs have places in common that could be recognised: they are "
-        f"{len(groups)} separate maps, {', '.join(told)}, and where these lie relative to each other "
-        "is unknown"
+        f"{len(groups)} separate maps, {told}, and where these lie relative to each other is unknown"
     )
-    with folder.stage("report"):
-        folder.save()
-        report_run(folder, Run(folder.path), complete=True)
+    folder.record.found = Found(merging={**found.record, "maps": described}, notes=(note,))
+    report_run(folder, folder.record.found)
     return maps
 
 
@@ -158,31 +152,59 @@ def _remove_earlier_maps(folder: Path, kept: set[str]) -> None:
                 path.rmdir()
 
 
-def _one_map(folder: RunFolder, group: Placed, found: Ingredients) -> MergedMap:
+def _one_map(
+    folder: RunFolder, group: Placed, found: Ingredients, described: dict[str, Any]
+) -> MergedMap:
     """Register the runs of a group with each other, and write their map."""
-    numbers = sorted({part.run for part in group.trajectories})
-    sources = [found.sources[n] for n in numbers]
-    recorded = [_moved(found.surveys[n].recorded, group, n) for n in numbers]
-    estimates = [r.estimate for r in recorded]
-    if len(numbers) > 1:
-        with folder.stage("register"), found.watch.stage("register") as _:
-            result = register_jointly(recorded, threads=found.options.threads)
-        estimates = result.estimates
-        folder.record["loop_closure"] = result.record
+    sources = [found.sources[n] for n in _numbers(group)]
+    recorded = [_moved(found.surveys[n].recorded, group, n) for n in _numbers(group)]
+    placed = estimates = [r.estimate for r in recorded]
+    notes, closing = _warnings(group, found), None
+    if len(sources) > 1:
+        with folder.stage("register"), found.progress.stage("register"):
+            result = register_jointly(recorded, threads=found.settings.threads)
+        estimates, closing = result.estimates, result.record
         if result.failure is not None:
-            folder.record["warnings"].append(
+            notes.append(
                 "the runs were put together by their places only, they were not registered with each "
                 f"other: {result.failure}"
             )
-    run = Run(folder.path)
+    trajectory = joined_trajectory(estimates)
     with folder.stage("map"):
-        write_trajectories(folder, sources, [r.estimate for r in recorded], estimates)
-        write_map(folder, sources, run, estimates, options=found.options, watch=found.watch)
-    run.estimate = Estimate(one_after_the_other(estimates), estimates[0].calibration)
-    with folder.stage("report"):
-        folder.save()
-        report_run(folder, run, complete=True)
+        runs = write_trajectories(folder, sources, placed, estimates)
+        written = write_map(
+            folder,
+            [_map_source(s, e, found) for s, e in zip(sources, estimates, strict=True)],
+            found.settings,
+            duration=float(trajectory.times[-1]),
+        )
+    folder.record.found = Found(
+        loop_closure=closing,
+        merging={**found.record, "maps": [described]},
+        map=written,
+        runs=runs,
+        notes=tuple(notes),
+    )
+    report_run(folder, folder.record.found, trajectory)
     return MergedMap(folder.path, [source.name for source in sources], estimates)
+
+
+def _map_source(source: Source, estimate: Estimate, found: Ingredients) -> MapSource:
+    def chunks(counts: dict[str, int]) -> Iterator[MapChunk]:
+        with (
+            source.part() as part,
+            found.progress.stage(f"map {source.name}", part.length) as shown,
+        ):
+            yield from project(
+                part.batches(shown, Counter()),
+                estimate.trajectory,
+                estimate.calibration,
+                segments=estimate.segments,
+                threads=found.settings.threads,
+                counts=counts,
+            )
+
+    return MapSource(estimate, source.start_ns, chunks)
 
 
 def _moved(recorded: Recorded, group: Placed, number: int) -> Recorded:

@@ -17,21 +17,21 @@ from bentwing.closing.joining.matches import Part, find_matches, parts_of
 from bentwing.closing.joining.placing import place_groups
 from bentwing.closing.joining.survey import Survey, survey
 from bentwing.map.clean import CleanSettings
-from bentwing.map.writer import require_format
-from bentwing.recording import Recording
-from bentwing.recording.preprocess import RecordingPart
 from bentwing.run.folder import RunFolder
+from bentwing.run.found import Found
 from bentwing.run.merging.maps import Ingredients, MergedMap, make_maps
 from bentwing.run.merging.source import Source, open_sources
-from bentwing.run.merging.writing import MapOptions, as_settings
+from bentwing.run.settings import merge_settings
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
+
+    from bentwing.run.settings import MergeSettings
 
 
 @dataclass(frozen=True, slots=True)
 class Merged:
-    """What became of several runs.
+    """Several runs, merged.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class Merged:
 
     out: Path
     maps: list[MergedMap]
-    record: dict[str, Any]
+    record: Mapping[str, Any]
 
 
 def merge(
@@ -77,29 +77,33 @@ def merge(
     ------
     UsageError, InputError, EstimationError
     """
-    require_format(map_format)
+    settings = merge_settings(
+        map_format=map_format,
+        map_spacing=map_spacing,
+        cleaning=cleaning or CleanSettings(),
+        threads=threads,
+        runs=[Path(run).resolve() for run in runs],
+    )
     sources = open_sources([Path(run) for run in runs])
     if any(Path(out).resolve() == source.folder.resolve() for source in sources):
         msg = (
             f"{out}: is one of the runs that are to be merged; choose another folder for the result"
         )
         raise UsageError(msg)
-    options = MapOptions(map_format, map_spacing, threads, cleaning or CleanSettings())
-    settings = {"runs": [str(s.folder.resolve()) for s in sources], **as_settings(options)}
-    with RunFolder(Path(out), settings) as folder:
-        return merge_into(folder, sources, options, progress or Progress())
+    with RunFolder(Path(out), settings.to_json()) as folder:
+        return merge_into(folder, sources, settings, progress or Progress())
 
 
 def merge_into(
-    folder: RunFolder, sources: list[Source], options: MapOptions, watch: Progress
+    folder: RunFolder, sources: list[Source], settings: MergeSettings, progress: Progress
 ) -> Merged:
     """Merge opened runs into a folder that is open, too; see `merge`."""
     with folder.stage("inputs"):
         folder.add_inputs([path for source in sources for path in source.recordings])
     with folder.stage("survey"):
-        surveys = _surveyed(sources, options, watch)
+        surveys = _surveyed(sources, settings, progress)
     parts = parts_of(surveys)
-    with folder.stage("match"), watch.stage("match", _n_pairs(len(parts)), "pairs") as shown:
+    with folder.stage("match"), progress.stage("match", _n_pairs(len(parts)), "pairs") as shown:
         matches = find_matches(parts, shown)
     trajectories = {
         Part(r, s): stretches.trajectory
@@ -115,36 +119,34 @@ def merge_into(
     record = {
         "parts": describe_parts_of(names, parts),
         "candidates": describe_matches(names, matches),
-        "maps": [],
     }
-    folder.record["merging"] = record
+    folder.record.found = Found(merging={**record, "maps": []})
     folder.save()
-    found = Ingredients(sources, surveys, options, watch)
-    maps = make_maps(folder, groups, matches, found)
-    return Merged(folder.path, maps, record)
+    found = Ingredients(sources, surveys, matches, record, settings, progress)
+    return Merged(folder.path, make_maps(folder, groups, found), folder.record.found.merging or {})
 
 
 def _n_pairs(n: int) -> float:
     return n * (n - 1) / 2
 
 
-def _surveyed(sources: Sequence[Source], options: MapOptions, watch: Progress) -> list[Survey]:
+def _surveyed(
+    sources: Sequence[Source], settings: MergeSettings, progress: Progress
+) -> list[Survey]:
     seconds = sum(length_of(source.estimate) for source in sources)
     budget = Budget.of(seconds, GlobalSettings())
-    watch.note(f"merging: {budget.sentence()}")
+    progress.note(f"merging: {budget.sentence()}")
     surveys = []
     for source in sources:
-        with Recording(source.recordings, source.payload) as recording:
-            part = RecordingPart(recording, source.payload, source.start, source.duration)
-            with watch.stage(f"survey {source.name}", part.length) as shown:
-                surveys.append(
-                    survey(
-                        source.name,
-                        source.estimate,
-                        part.batches(shown, Counter()),
-                        source.payload,
-                        surfel_rate=budget.rate,
-                        threads=options.threads,
-                    )
+        with source.part() as part, progress.stage(f"survey {source.name}", part.length) as shown:
+            surveys.append(
+                survey(
+                    source.name,
+                    source.estimate,
+                    part.batches(shown, Counter()),
+                    source.payload,
+                    surfel_rate=budget.rate,
+                    threads=settings.threads,
                 )
+            )
     return surveys

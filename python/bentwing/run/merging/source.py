@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,20 +11,16 @@ from typing import TYPE_CHECKING, Any
 from pydantic import ValidationError
 
 from bentwing.base.errors import InputError, UsageError
-from bentwing.base.estimate import Estimate
 from bentwing.base.provenance import describe_input
 from bentwing.base.run_record import read_record
-from bentwing.base.trajectory import DT, read_tum
-from bentwing.odometry.segments import joined
-from bentwing.recording import Payload
-from bentwing.run.checkpoint import read_calibration
+from bentwing.recording import Payload, Recording
+from bentwing.recording.preprocess import RecordingPart
+from bentwing.run.run import estimate_of, require_single
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
-    from bentwing.base.trajectory import Trajectory
-
-_ROUNDED = 1e-6  # s; stamps in files are rounded to the nanosecond
+    from bentwing.base.estimate import Estimate
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +48,12 @@ class Source:
     estimate: Estimate
     inputs: list[dict[str, Any]]
     warnings: list[str]
+
+    @contextmanager
+    def part(self) -> Iterator[RecordingPart]:
+        """Open the part of the recording that the run used."""
+        with Recording(self.recordings, self.payload) as recording:
+            yield RecordingPart(recording, self.payload, self.start, self.duration)
 
 
 def open_sources(folders: Sequence[Path]) -> list[Source]:
@@ -94,14 +97,7 @@ def distinct_names(names: Sequence[str]) -> list[str]:
 
 def open_source(folder: Path, name: str) -> Source:
     """Read the run in a folder; see `open_sources`."""
-    record = read_record(folder)
-    if record.get("runs"):
-        of = ", ".join(str(run.get("folder")) for run in record["runs"])
-        msg = f"{folder}: holds a merged map; give the runs that it was made of ({of}) instead"
-        raise UsageError(msg)
-    if not record.get("complete"):
-        msg = f"{folder}: the run is not complete; finish it with `bentwing map ... --resume` first"
-        raise UsageError(msg)
+    record = require_single(folder, read_record(folder))
     if not record.get("recordings") or record.get("start_ns") is None:
         msg = (
             f"{folder}: run.json does not say where the recording lies, as those of earlier versions; "
@@ -119,7 +115,7 @@ def open_source(folder: Path, name: str) -> Source:
         settings.get("duration"),
         int(record["start_ns"]),
         _payload(folder, settings),
-        _estimate(folder, record),
+        estimate_of(folder, record),
         record["inputs"],
         list(record.get("warnings") or []),
     )
@@ -133,26 +129,6 @@ def _payload(folder: Path, settings: dict[str, Any]) -> Payload:
             f"{folder}: run.json describes no sensor head that can be used ({error}); map it again"
         )
         raise InputError(msg) from error
-
-
-def _estimate(folder: Path, record: dict[str, Any]) -> Estimate:
-    poses, _ = read_tum(folder / "trajectory.txt", int(record["start_ns"]))
-    spans = record.get("segments") or [[float(poses.times[0]), float(poses.times[-1])]]
-    cut = [poses.within([(a - _ROUNDED, b + _ROUNDED)]) for a, b in spans]
-    segments = [part for part in cut if len(part.times) > 1]
-    if not segments:
-        msg = f"{folder / 'trajectory.txt'}: does not cover the segments in run.json; map it again"
-        raise InputError(msg)
-    return Estimate(
-        joined(segments, DT),
-        read_calibration(record["calibration"]),
-        windows=record.get("windows") or [],
-        segments=[_span(part) for part in segments],
-    )
-
-
-def _span(part: Trajectory) -> tuple[float, float]:
-    return float(part.times[0]), float(part.times[-1])
 
 
 def _require_unchanged(

@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""What the stages of a run have found, as values; each knows its part of run.json."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+
+from bentwing.map.sample import MapSample
+from bentwing.recording import ImuBatch
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from bentwing.base.estimate import Estimate
+    from bentwing.closing.georeference import Georeferenced
+    from bentwing.closing.localize import GivenCoordinates
+    from bentwing.recording import Batch
+
+    Placed: TypeAlias = Georeferenced | GivenCoordinates
+    Record: TypeAlias = Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """What the first pass over a recording has read and dropped."""
+
+    counts: dict[str, int] = field(default_factory=dict)
+    warnings: list[str] = field(default_factory=list)
+
+
+@dataclass(slots=True)
+class Spin:
+    """Rate of turn of the IMU, about ten values a second.
+
+    Attributes
+    ----------
+    times, rates : s and rad/s
+    """
+
+    times: list[float] = field(default_factory=list)
+    rates: list[float] = field(default_factory=list)
+
+    def watch(self, batch: Batch) -> None:
+        """Note the rate of turn of an IMU batch."""
+        if isinstance(batch, ImuBatch) and len(batch.times):
+            self.times.append(float(batch.times.mean()))
+            self.rates.append(float(np.median(np.linalg.norm(batch.gyro, axis=1))))
+
+    @property
+    def series(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+        """Times (N,) s and rates (N,) rad/s; None without an IMU."""
+        return (np.array(self.times), np.array(self.rates)) if self.times else None
+
+
+@dataclass(frozen=True, slots=True)
+class WrittenMap:
+    """A map that was written.
+
+    Attributes
+    ----------
+    path : its file
+    counts : points that were projected, left out and written
+    record : how it was cleaned, for run.json
+    sample : evenly chosen points, in the frame of the trajectory
+    change : points that have appeared and disappeared since the prior map, for run.json
+    """
+
+    path: Path
+    counts: dict[str, int]
+    record: dict[str, Any]
+    sample: MapSample
+    change: dict[str, int] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """What the stages of a run have found so far; each returns it with one thing more.
+
+    Attributes
+    ----------
+    estimate : trajectory, calibration and diagnostics; None before there are any
+    reading : what was read
+    spin : how the IMU turned
+    localization, loop_closure, merging : what was done to correct the trajectory, for run.json
+    placed : where the map is on the Earth, or in the coordinates of a prior map
+    map : the map
+    runs : of a merged map, the runs in it, for run.json
+    notes : sentences of the stages behind the estimate
+    failure : why the last stage did not finish
+    """
+
+    estimate: Estimate | None = None
+    reading: Reading = Reading()
+    spin: Spin = field(default_factory=Spin)
+    localization: Record | None = None
+    loop_closure: Record | None = None
+    merging: Record | None = None
+    placed: Placed | None = None
+    map: WrittenMap | None = None
+    runs: tuple[Record, ...] = ()
+    notes: tuple[str, ...] = ()
+    failure: BaseException | None = None
+
+    @property
+    def sample(self) -> MapSample:
+        """Evenly chosen points of the map; none before there is one."""
+        return MapSample() if self.map is None else self.map.sample
+
+    @property
+    def warnings(self) -> list[str]:
+        """Sentences about the health of the result, each once."""
+        sentences = [*self.reading.warnings, *self.notes]
+        if self.estimate is not None:
+            sentences[len(self.reading.warnings) : len(self.reading.warnings)] = (
+                self.estimate.warnings
+            )
+        return list(dict.fromkeys(sentences))
+
+    @property
+    def timings(self) -> dict[str, float]:
+        """Seconds of wall time by stage of the estimate."""
+        timings = {} if self.estimate is None else self.estimate.timings
+        return {f"estimate/{stage}": seconds for stage, seconds in timings.items()}
+
+    def to_json(self) -> dict[str, Any]:
+        """Return what run.json says about the result."""
+        estimate, written = self.estimate, self.map
+        counts = {**self.reading.counts}
+        if estimate is not None:
+            counts.update(estimate.counts)
+        if written is not None:
+            counts.update(written.counts)
+        localization = self.localization
+        if localization is not None and written is not None and written.change is not None:
+            localization = {**localization, **written.change}
+        return {
+            "counts": counts,
+            "warnings": self.warnings,
+            "calibration": None if estimate is None else estimate.calibration,
+            "localization": localization,
+            "loop_closure": self.loop_closure,
+            "georeference": None if self.placed is None else self.placed.record,
+            "map": {} if written is None else written.record,
+            "merging": self.merging,
+            "segments": [] if estimate is None else estimate.segments,
+            "windows": [] if estimate is None else estimate.windows,
+            **({"runs": self.runs} if self.runs else {}),
+        }

@@ -15,12 +15,14 @@ from zipfile import BadZipFile
 import numpy as np
 
 from bentwing.base.atomic import write_bytes
+from bentwing.base.breaks import Break
 from bentwing.base.calibration import Calibration
 from bentwing.base.errors import UsageError
 from bentwing.base.estimate import Estimate
 from bentwing.base.mount import FixedMount, MotorMount, Pose
 from bentwing.base.plain import plain
 from bentwing.base.trajectory import Trajectory
+from bentwing.base.window_record import WindowRecord
 
 if TYPE_CHECKING:
     from bentwing.base.mount import Mount
@@ -71,7 +73,7 @@ class Checkpoint:
             "calibration": plain(estimate.calibration),
             "estimate": {
                 name: plain(getattr(estimate, name))
-                for name in ("windows", "counts", "timings", "warnings", "segments")
+                for name in ("windows", "counts", "timings", "health", "breaks", "segments")
             },
             "record": {name: plain(record.get(name)) for name in _RECORDED},
             "files": [name for name in record["files"] if name != NAME],
@@ -111,6 +113,8 @@ class Checkpoint:
         trajectory = Trajectory(*(arrays[name] for name in _TRAJECTORY))
         fields = described["estimate"]
         fields["segments"] = [(first, last) for first, last in fields["segments"]]
+        fields["windows"] = [WindowRecord.from_json(window) for window in fields["windows"]]
+        fields["breaks"] = [Break(**broken) for broken in fields["breaks"]]
         run.estimate = Estimate(trajectory, read_calibration(described["calibration"]), **fields)
         run.spin_times, run.spin_rates = arrays["spin"].tolist()
         self._folder.record.update(described["record"])

@@ -19,7 +19,6 @@ from bentwing.map.clean import CleanSettings, clean
 from bentwing.map.project import project
 from bentwing.map.thin import thin
 from bentwing.map.writer import open_map
-from bentwing.odometry.segments import GUESSED
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -102,6 +101,7 @@ def register(job: Job) -> None:
     job.run.estimate = closed.estimate
     folder.record["loop_closure"] = closed.record
     folder.add_estimate(closed.estimate)
+    folder.record["warnings"] += closed.warnings
     job.write_trajectory("trajectory.txt", closed.estimate)
 
 
@@ -124,11 +124,10 @@ def _closed(job: Job, found: Estimate, budget: Budget, shown: Stage) -> Closed:
         closed, job.folder.record["merging"] = close_segments(
             found, batches, payload, budget=budget, threads=threads
         )
-        # Breaks that were healed are none; what is true now comes with the estimate.
+        # Of the breaks that were guessed more is known now; it comes with the estimate.
+        outdated = {*found.warnings} - {*closed.estimate.warnings}
         job.folder.record["warnings"] = [
-            w
-            for w in job.folder.record["warnings"]
-            if GUESSED not in w or w in closed.estimate.warnings
+            w for w in job.folder.record["warnings"] if w not in outdated
         ]
         return closed
     known = None if job.prior is None else job.prior.surfels_near(found.trajectory)

@@ -14,6 +14,7 @@ from bentwing.base.estimate import Estimate
 from bentwing.base.provenance import describe_input
 from bentwing.base.run_record import read_record
 from bentwing.base.trajectory import DT, read_tum
+from bentwing.base.window_record import WindowRecord
 from bentwing.odometry.segments import joined
 from bentwing.recording import Payload
 from bentwing.run.checkpoint import read_calibration
@@ -146,7 +147,7 @@ def _estimate(folder: Path, record: dict[str, Any]) -> Estimate:
     return Estimate(
         joined(segments, DT),
         read_calibration(record["calibration"]),
-        windows=record.get("windows") or [],
+        windows=[WindowRecord.from_json(window) for window in record.get("windows") or []],
         segments=[_span(part) for part in segments],
     )
 

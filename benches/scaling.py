@@ -79,7 +79,7 @@ def estimate(payload: Payload, batches: list[Batch], variant: Variant) -> dict[s
     found = {stage: result.timings[stage] for stage in STAGES}
     found["whole"] = time.perf_counter() - started
     for name in ("n_surfels", "n_matches", "n_fixed_matches"):
-        found[name] = statistics.fmean(window[name] for window in result.windows)
+        found[name] = statistics.fmean(getattr(window, name) for window in result.windows)
     return found
 
 

@@ -77,7 +77,7 @@ def test_frozen_states_stay_exactly_at_their_start(run, head):
     assert tuple(found.mount.T_imu_lidar.translation) == mount.translation
     assert found.mount.T_imu_lidar.quat_xyzw == pytest.approx(mount.quaternion, abs=1e-15)
     for key in ("latency", "gyro_bias", "accel_bias", "gravity", "extrinsic_quat_xyzw"):
-        values = np.array([w[key] for w in estimate.windows])
+        values = np.array([getattr(w, key) for w in estimate.windows])
         assert (values == values[0]).all(), key
     assert found.std == {}
 

@@ -11,6 +11,7 @@ import pytest
 
 from bentwing import odometry
 from bentwing.base.errors import EstimationError, NotEnoughDataError, PayloadError, UsageError
+from bentwing.base.window_record import WindowRecord
 from bentwing.recording import ImuBatch, LidarBatch
 
 
@@ -27,7 +28,7 @@ def all_bytes(estimate):
         calibration.gyro_bias.tobytes(),
         calibration.accel_bias.tobytes(),
         json.dumps(calibration.std),
-        json.dumps(estimate.windows),
+        json.dumps([window.to_json() for window in estimate.windows]),
         estimate.counts,
         estimate.warnings,
     ]
@@ -85,11 +86,13 @@ def test_the_map_begins_level_at_the_first_pose(plain_run, name):
 def test_the_record_of_an_estimate_is_json_and_tells_every_window(plain_run, name):
     estimate = plain_run(name)
     assert len(estimate.windows) >= 5
-    json.dumps([estimate.windows, estimate.counts, estimate.timings, estimate.warnings])
-    ends = [w["time"] for w in estimate.windows]
+    records = [window.to_json() for window in estimate.windows]
+    json.dumps([records, estimate.counts, estimate.timings, estimate.warnings])
+    assert [WindowRecord.from_json(record) for record in records] == estimate.windows
+    ends = [w.time for w in estimate.windows]
     assert ends == sorted(ends)
     for key in ("n_surfels", "n_matches", "residual_rms", "degenerate", "converged"):
-        assert all(key in w for w in estimate.windows)
+        assert all(key in record for record in records)
     assert all(isinstance(n, int) for n in estimate.counts.values())
 
 

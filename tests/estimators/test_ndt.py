@@ -104,7 +104,7 @@ def test_the_imu_is_asked_for_the_vertical_and_nothing_else(simulated):
 
 def test_every_scan_tells_its_registration_error(fixed):
     estimate, _ = fixed
-    errors = [w["registration_rmse"] for w in estimate.windows]
+    errors = [w.registration_rmse for w in estimate.windows]
     assert len(errors) == estimate.counts["ndt.scans"] - 1 >= 215
     assert 0.01 < np.mean(errors) < 0.1  # m, of ranges with 20 mm off surfaces that are not flat
 

@@ -62,7 +62,7 @@ def test_reading_and_feeding_do_not_wait_for_a_registration(new, flight, held):
     assert pose.predicted > 3.0
     odometry.feed(flight.pieces[len(until(flight.pieces, 11.0))])
     assert odometry.status == "coasting"
-    assert odometry.health["time"] < 8.0
+    assert odometry.health.time < 8.0
     assert len(odometry.map_points())
     assert len(odometry.trajectory.times)
     assert not odometry.wait(0.01)
@@ -109,8 +109,8 @@ def read_until(done, odometry):
         assert np.isfinite(pose.position).all()
         newest = pose.time
         odometry.new_points()
-        assert window <= odometry.health["time"] <= odometry.pose().time
-        window = odometry.health["time"]
+        assert window <= odometry.health.time <= odometry.pose().time
+        window = odometry.health.time
         assert odometry.counts["live.points_dropped"] == 0
 
 

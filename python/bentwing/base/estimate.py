@@ -4,11 +4,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from bentwing.base.breaks import Break
     from bentwing.base.calibration import Calibration
     from bentwing.base.trajectory import Trajectory
+    from bentwing.base.window_record import WindowRecord
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,20 +21,25 @@ class Estimate:
     ----------
     trajectory : 100 Hz poses of the IMU in the map
     calibration : the slow states at the end
-    windows : one record per window (`time`, `n_surfels`, `n_matches`, `n_fixed_matches`,
-        `inlier_share`, `residual_rms` in units of the noise, `iterations`, `degenerate`,
-        eigenvalues of the geometric information, …), for run.json and the report
+    windows : one record per window, sweep or scan
     counts : what was used and what was dropped
     timings : seconds of wall time by stage
-    warnings : sentences about the health of the estimate
+    health : sentences about what makes the estimate worse than usual, breaks apart
+    breaks : where the recording breaks
     segments : first and last time of each stretch without a break, s; between them the trajectory
         is a guess
     """
 
     trajectory: Trajectory
     calibration: Calibration
-    windows: list[dict[str, Any]] = field(default_factory=list)
+    windows: list[WindowRecord] = field(default_factory=list)
     counts: dict[str, int] = field(default_factory=dict)
     timings: dict[str, float] = field(default_factory=dict)
-    warnings: list[str] = field(default_factory=list)
+    health: list[str] = field(default_factory=list)
+    breaks: list[Break] = field(default_factory=list)
     segments: list[tuple[float, float]] = field(default_factory=list)
+
+    @property
+    def warnings(self) -> list[str]:
+        """Sentences for the user: health, then the breaks."""
+        return [*self.health, *(b.sentence() for b in self.breaks)]

@@ -4,16 +4,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from bentwing.odometry.segments import (
-    MAX_IMU_GAP,
-    MAX_LIDAR_GAP,
-    MAX_LIDAR_GAP_WITHOUT_IMU,
-    Break,
-)
+from bentwing.base.breaks import Break
+from bentwing.odometry.segments import MAX_IMU_GAP, MAX_LIDAR_GAP, MAX_LIDAR_GAP_WITHOUT_IMU
 from bentwing.recording.batches import EncoderBatch, ImuBatch, LidarBatch
 
 if TYPE_CHECKING:
@@ -123,7 +119,10 @@ class BatchBuffer:
 
 
 def _breaks(
-    sensor: str, held: Sequence[LidarBatch | ImuBatch], batch: LidarBatch | ImuBatch, longest: float
+    sensor: Literal["lidar", "inertial"],
+    held: Sequence[LidarBatch | ImuBatch],
+    batch: LidarBatch | ImuBatch,
+    longest: float,
 ) -> list[Break]:
     before = held[-1].times[-1:] if held else batch.times[:1]
     times = np.concatenate([before, batch.times])

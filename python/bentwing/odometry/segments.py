@@ -3,18 +3,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bentwing.base import geometry
+from bentwing.base.breaks import HEAD, Break
 from bentwing.base.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
+
+    from bentwing.base.window_record import WindowRecord
 
 # After a longer silence the estimate may have lost its place, s: without the IMU because a spinning
 # head turns by a radian at an unknown rate; without the lidar because the integrated noise of the
@@ -33,42 +35,6 @@ LOST_RESIDUAL = 1.4
 RECENT = 0.1
 
 
-HEAD = "head"
-"""In place of a sensor: the head of a 2D lidar stood still."""
-GUESSED = "its place relative to what came before is a guess"
-"""How the sentence about a break ends after which the trajectory begins anew."""
-
-
-@dataclass(frozen=True, slots=True)
-class Break:
-    """A silence of one sensor: its last stamp before and its first stamp after, s.
-
-    Or, for `HEAD`, the time in which it did not turn.
-    """
-
-    sensor: str
-    start: float
-    stop: float
-
-    def sentence(self, *, bridged: bool) -> str:
-        """Say what happened and what became of it."""
-        span = f"from {self.start:.2f} to {self.stop:.2f} s"
-        what = f"no {self.sensor} data {span}"
-        if self.sensor == HEAD:
-            what = f"the head stood still {span}"
-        if bridged:
-            there = "the IMU's and single planes'" if self.sensor == HEAD else "a guess"
-            return (
-                f"{what}: the trajectory there is {there}; what was seen before and after fits "
-                "together"
-            )
-        return (
-            f"{what}, and what was seen before and after does not fit together: the trajectory "
-            "begins anew there, in the direction of the last motion; what follows is accurate in "
-            f"itself, but {GUESSED}"
-        )
-
-
 def extrapolated(
     trajectory: Trajectory, time: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -83,20 +49,20 @@ def extrapolated(
     return positions[-1] + share * (positions[-1] - positions[-1 - n]), quat.reshape(4)
 
 
-def found_again(windows: Sequence[dict[str, Any]], silence: Break) -> bool:
+def found_again(windows: Sequence[WindowRecord], silence: Break) -> bool:
     """Whether the windows after a silence fit their surroundings as well as those before."""
-    before = [w for w in windows if w["time"] <= silence.start]
+    before = [w for w in windows if w.time <= silence.start]
     first, last = silence.stop + JUDGED[0], silence.stop + JUDGED[1]
-    after = [w for w in windows if first <= w["time"] <= last]
+    after = [w for w in windows if first <= w.time <= last]
     if not before or not after:
         # Too little was seen since a head has turned again to doubt what its planes have told.
         return silence.sensor == HEAD
     usual, now = (
-        {name: [w[name] for w in part] for name in ("inlier_share", "residual_rms")}
+        np.array([(w.inlier_share, w.residual_rms) for w in part], dtype=np.float64)
         for part in (before, after)
     )
-    fits = np.mean(now["inlier_share"]) > np.median(usual["inlier_share"]) - LOST_INLIERS
-    sharp = np.mean(now["residual_rms"]) < LOST_RESIDUAL * np.median(usual["residual_rms"])
+    fits = np.mean(now[:, 0]) > np.median(usual[:, 0]) - LOST_INLIERS
+    sharp = np.mean(now[:, 1]) < LOST_RESIDUAL * np.median(usual[:, 1])
     return bool(fits and sharp)
 
 

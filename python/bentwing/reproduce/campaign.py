@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from bentwing.base.window_record import WindowRecord
     from bentwing.reproduce.figure import Assignment
     from bentwing.reproduce.trials import Attempt, Flight
 
@@ -64,7 +65,7 @@ class Result:
     distances: Array
     points: NDArray[np.float32]
     why: str
-    windows: list[dict[str, Any]]
+    windows: list[WindowRecord]
     length: float
     seconds: float
     cpu: float
@@ -255,7 +256,7 @@ def _result(tried: Attempt) -> Result:
     times, distances = np.zeros(0), np.zeros(0)
     points = _NO_POINTS
     trajectory = aligned = from_start = None
-    windows: list[dict[str, Any]] = []
+    windows: list[WindowRecord] = []
     why = tried.why
     if tried.estimate is not None:
         trajectory, windows = tried.estimate.trajectory, tried.estimate.windows

@@ -99,8 +99,8 @@ def _failure(flight: Flown) -> list[Figure]:
     shares = [
         Series(
             name,
-            np.array([w["time"] for w in result.windows]),
-            np.array([100.0 * (w.get("inlier_share") or 0.0) for w in result.windows]),
+            np.array([w.time for w in result.windows]),
+            np.array([100.0 * (w.inlier_share or 0.0) for w in result.windows]),
         )
         for name, result in (("Ours (kalman)", ours), ("R-FAST-LIO", ignored))
     ]

@@ -48,6 +48,6 @@ def measure(flight: Flown, result: Result) -> Measured:
     errors = pose_errors(result.trajectory, flight.truth)
     way = np.interp(errors.times, flight.truth.times, flight.way)
     far = np.flatnonzero(errors.rte > FAR)
-    registered = [w for w in result.windows if w.get("registration_rmse") is not None]
-    rmse = np.array([(w["time"], w["registration_rmse"]) for w in registered]).reshape(-1, 2)
+    registered = [w for w in result.windows if w.registration_rmse is not None]
+    rmse = np.array([(w.time, w.registration_rmse) for w in registered]).reshape(-1, 2)
     return Measured(errors, way, float(way[far[0]]) if len(far) else None, rmse)

@@ -15,12 +15,14 @@ from zipfile import BadZipFile
 import numpy as np
 
 from bentwing.base.atomic import write_bytes
+from bentwing.base.breaks import Break
 from bentwing.base.calibration import Calibration
 from bentwing.base.errors import UsageError
 from bentwing.base.estimate import Estimate
 from bentwing.base.mount import FixedMount, MotorMount, Pose
 from bentwing.base.plain import plain
 from bentwing.base.trajectory import Trajectory
+from bentwing.base.window_record import WindowRecord
 from bentwing.run.found import Found, Reading, Spin
 
 if TYPE_CHECKING:
@@ -29,7 +31,7 @@ if TYPE_CHECKING:
 
 NAME = "checkpoint.npz"
 _TRAJECTORY = ("times", "positions", "quats_xyzw")
-_OF_ESTIMATE = ("windows", "counts", "timings", "warnings", "segments")
+_OF_ESTIMATE = ("windows", "counts", "timings", "health", "breaks", "segments")
 _CORRECTIONS = ("localization", "loop_closure", "merging")
 # What must be the same for a run to go on; the number of threads changes no bit.
 _FREE = frozenset({"threads"})
@@ -138,6 +140,8 @@ class Checkpoint:
 def _found(arrays: dict[str, Any], described: dict[str, Any]) -> Found:
     fields = described["estimate"]
     fields["segments"] = [(first, last) for first, last in fields["segments"]]
+    fields["windows"] = [WindowRecord.from_json(window) for window in fields["windows"]]
+    fields["breaks"] = [Break(**broken) for broken in fields["breaks"]]
     trajectory = Trajectory(*(arrays[name] for name in _TRAJECTORY))
     return Found(
         Estimate(trajectory, read_calibration(described["calibration"]), **fields),

@@ -11,6 +11,7 @@ from bentwing.base.errors import InputError, UsageError
 from bentwing.base.estimate import Estimate
 from bentwing.base.run_record import read_record
 from bentwing.base.trajectory import DT, read_tum
+from bentwing.base.window_record import WindowRecord
 from bentwing.odometry.segments import joined
 from bentwing.run.checkpoint import read_calibration
 
@@ -104,6 +105,6 @@ def estimate_of(folder: Path, record: Mapping[str, Any]) -> Estimate:
     return Estimate(
         joined(segments, DT),
         read_calibration(record["calibration"]),
-        windows=record.get("windows") or [],
+        windows=[WindowRecord.from_json(window) for window in record.get("windows") or []],
         segments=[(float(part.times[0]), float(part.times[-1])) for part in segments],
     )

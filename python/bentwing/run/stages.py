@@ -96,7 +96,12 @@ def close(job: Job, found: Found) -> Found:
             closed = close_loops(
                 open_loop, batches, part.payload, budget=budget, known=near, threads=threads
             )
-    return replace(found, estimate=closed.estimate, loop_closure=closed.record)
+    return replace(
+        found,
+        estimate=closed.estimate,
+        loop_closure=closed.record,
+        notes=(*found.notes, *closed.warnings),
+    )
 
 
 def _localize(job: Job, found: Found, prior: PriorMap) -> Found:

@@ -78,7 +78,7 @@ class FakeEstimator:
             np.zeros(3),
             np.array([0, 0, 9.8]),
         )
-        return Estimate(trajectory, calibration, warnings=["one plane only at 3 s"])
+        return Estimate(trajectory, calibration, health=["one plane only at 3 s"])
 
 
 @pytest.fixture

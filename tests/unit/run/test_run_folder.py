@@ -15,6 +15,7 @@ from bentwing.base.plain import plain
 from bentwing.base.provenance import describe_input
 from bentwing.base.run_record import read_record
 from bentwing.base.trajectory import Trajectory
+from bentwing.base.window_record import WindowRecord
 from bentwing.run.folder import RunFolder
 from bentwing.run.found import Found
 
@@ -32,8 +33,11 @@ def estimate():
         0.002, mount, np.zeros(3), np.zeros(3), np.array([0, 0, 9.8]),
         std={"latency": [1e-5]},
     )  # fmt: skip
-    windows = [{"time": np.float64(1.0), "n_matches": np.int64(7), "residual_rms": np.nan}]
-    return Estimate(trajectory, calibration, windows, {"used": 5}, {"solve": 1.5}, ["a warning"])
+    window = WindowRecord(
+        time=np.float64(1.0), n_surfels=9, n_matches=np.int64(7), inlier_share=None,
+        residual_rms=np.nan, iterations=2, converged=True, degenerate=False,
+    )  # fmt: skip
+    return Estimate(trajectory, calibration, [window], {"used": 5}, {"solve": 1.5}, ["a warning"])
 
 
 def test_a_run_that_ends_well_is_complete_and_names_its_files(tmp_path):
@@ -48,7 +52,8 @@ def test_a_run_that_ends_well_is_complete_and_names_its_files(tmp_path):
     assert record["files"] == ["trajectory.txt"]
     assert record["settings"] == {"estimator": "continuous"}
     assert record["calibration"]["std"] == {"latency": [1e-5]}
-    assert record["windows"] == [{"time": 1.0, "n_matches": 7, "residual_rms": None}]
+    (window,) = record["windows"]
+    assert (window["time"], window["n_matches"], window["residual_rms"]) == (1.0, 7, None)
     assert record["timings"]["estimate"] <= record["timings"]["total"]
     assert record["timings"]["estimate/solve"] == 1.5
     assert record["peak_memory_mb"] > 10

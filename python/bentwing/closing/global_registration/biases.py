@@ -9,11 +9,11 @@ import numpy as np
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from typing import Any
 
     from numpy.typing import NDArray
 
     from bentwing.base.estimate import Estimate
+    from bentwing.base.window_record import WindowRecord
 
 # A window that knows a bias this much less well than the last one says nothing of its history: what
 # changes until then is what is known, not the bias.
@@ -36,14 +36,11 @@ def drift_of(estimate: Estimate, name: str, times: NDArray[np.float64]) -> NDArr
     settled = _settled(estimate.windows, name)
     if not settled:
         return np.zeros((len(times), 3))
-    at = np.array([w["time"] for w in settled])
-    values = np.array([w[name] for w in settled]) - final
+    at = np.array([w.time for w in settled])
+    values = np.array([getattr(w, name) for w in settled]) - final
     return np.stack([np.interp(times, at, axis) for axis in values.T], axis=1)
 
 
-def _settled(windows: Sequence[dict[str, Any]], name: str) -> list[dict[str, Any]]:
-    known = [w for w in windows if name in w and name in w.get("std", {})]
-    if not known:
-        return []
-    limit = SETTLED * max(known[-1]["std"][name])
-    return [w for w in known if max(w["std"][name]) <= limit]
+def _settled(windows: Sequence[WindowRecord], name: str) -> list[WindowRecord]:
+    known = [(w, max(w.std[name])) for w in windows if w.std is not None and name in w.std]
+    return [w for w, std in known if std <= SETTLED * known[-1][1]]

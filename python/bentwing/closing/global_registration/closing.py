@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from bentwing import _core
@@ -42,10 +42,12 @@ class Closed:
     ----------
     estimate : corrected, or as it was where that failed
     record : what was done, for run.json
+    warnings : sentences, where it failed
     """
 
     estimate: Estimate
     record: dict[str, Any]
+    warnings: list[str] = field(default_factory=list)
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +104,7 @@ def close_loops(
 
     Returns
     -------
-    The corrected estimate, or the one given, with a warning, where the correction cannot be trusted.
+    The corrected estimate, or the one given and a warning where the correction cannot be trusted.
     """
     settings = settings or GlobalSettings()
     budget = budget or Budget.of(length_of(estimate), settings)
@@ -122,16 +124,15 @@ def close_loops(
     )
     if "timings" in found.record:
         found.record["timings"] = {"surfels": collected, **found.record["timings"]}
-    (closed,) = found.estimates
+    warnings = []
     if found.failure is not None:
         what = "the loops were not closed, the trajectory is open-loop"
         if known is not None:
             what = (
                 "the trajectory was not registered with the map, its places alone say where it is"
             )
-        sentence = f"{what}: {found.failure}"
-        closed = replace(closed, warnings=[*closed.warnings, sentence])
-    return Closed(closed, found.record)
+        warnings = [f"{what}: {found.failure}"]
+    return Closed(found.estimates[0], found.record, warnings)
 
 
 def register_jointly(

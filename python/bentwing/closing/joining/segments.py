@@ -13,11 +13,12 @@ from bentwing.closing.joining.describe import describe_matches, describe_parts_o
 from bentwing.closing.joining.matches import Match, Part, connected, find_matches, parts_of
 from bentwing.closing.joining.placing import place_groups
 from bentwing.closing.joining.survey import survey
-from bentwing.odometry.segments import GUESSED, joined
+from bentwing.odometry.segments import joined
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
+    from bentwing.base.breaks import Break
     from bentwing.base.estimate import Estimate
     from bentwing.recording import Batch, Payload
 
@@ -68,44 +69,37 @@ def close_segments(
     moved = replace(
         estimate,
         trajectory=joined([s.trajectory for s in segments], DT),
-        warnings=_warnings(estimate.warnings, together, matches),
+        breaks=_judged(estimate.breaks, together, matches),
     )
     recorded = replace(found.recorded, estimate=moved, segments=segments)
     result = register_jointly([recorded], budget=budget, threads=threads)
-    (closed,) = result.estimates
+    (closed,), warnings = result.estimates, list[str]()
     if result.failure is not None:
         sentence = f"the segments were not registered with each other: {result.failure}"
-        closed = replace(closed, warnings=[*closed.warnings, sentence])
+        warnings = [sentence]
     record = {
         "parts": describe_parts_of([NAME], parts),
         "candidates": describe_matches([NAME], matches),
         "groups": [[part.segment for part in group] for group in together],
         "graphs": [group.record for group in groups],
     }
-    return Closed(closed, result.record), record
+    return Closed(closed, result.record, warnings), record
 
 
-def _warnings(
-    sentences: Sequence[str], together: Sequence[Sequence[Part]], matches: Sequence[Match]
-) -> list[str]:
-    """Say of each break what is known now of the segments on its two sides."""
+def _judged(
+    breaks: Sequence[Break], together: Sequence[Sequence[Part]], matches: Sequence[Match]
+) -> list[Break]:
+    """Say of each guess whether the segments on its two sides share a place."""
     group_of = {part.segment: number for number, group in enumerate(together) for part in group}
-    told, boundary = [], 0
-    for sentence in sentences:
-        if GUESSED not in sentence:
-            told.append(sentence)
-            continue
-        before, after = group_of.get(boundary), group_of.get(boundary + 1)
-        boundary += 1
-        if before is None or before != after:
-            told.append(f"{sentence}: no place was found that both sides have seen")
-            continue
-        n = sum(m.believed for m in matches)
-        told.append(
-            sentence.replace(
-                GUESSED,
-                f"its place relative to what came before was found again by {n} places that more than "
-                "one segment has seen",
-            )
-        )
-    return told
+    n_places = sum(m.believed for m in matches)
+    judged, boundary = [], 0
+    for broken in breaks:
+        if broken.outcome == "guessed":
+            before, after = group_of.get(boundary), group_of.get(boundary + 1)
+            boundary += 1
+            if before is None or before != after:
+                broken = replace(broken, outcome="not found")
+            else:
+                broken = replace(broken, outcome="found", n_places=n_places)
+        judged.append(broken)
+    return judged

@@ -7,7 +7,7 @@ import weakref
 from collections import Counter
 from functools import partial
 from threading import Lock
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
     from bentwing.base.estimate import Estimate
     from bentwing.base.trajectory import Trajectory
+    from bentwing.base.window_record import WindowRecord
     from bentwing.flight.control import Stall
     from bentwing.odometry.continuous.settings import ContinuousSettings
     from bentwing.odometry.kalman import KalmanSettings
@@ -269,10 +270,10 @@ class Odometry:
         return np.empty((0, 3)) if newest is None else newest.done.normals()
 
     @property
-    def health(self) -> dict[str, Any] | None:
+    def health(self) -> WindowRecord | None:
         """The record of the last window, as in `Estimate.windows`; None while waiting."""
         newest = self._state.newest
-        return None if newest is None else dict(newest.done.windows[-1])
+        return None if newest is None else newest.done.windows[-1]
 
     @property
     def counts(self) -> dict[str, int]:

@@ -29,4 +29,4 @@ def status_of(newest: Registered | None, age: float, shift: float) -> Status:
         return "coasting"
     if newest.done.is_settling:
         return "initializing"
-    return "degenerate" if newest.done.windows[-1]["degenerate"] else "tracking"
+    return "degenerate" if newest.done.windows[-1].degenerate else "tracking"

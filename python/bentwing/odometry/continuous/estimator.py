@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from bentwing.base.breaks import HEAD, Break
 from bentwing.base.errors import NotEnoughDataError
 from bentwing.base.trajectory import DT
 from bentwing.odometry.buffer import BatchBuffer
@@ -15,7 +17,7 @@ from bentwing.odometry.continuous.outcome import estimate_of
 from bentwing.odometry.continuous.planar import is_plane
 from bentwing.odometry.continuous.settings import ContinuousSettings
 from bentwing.odometry.continuous.standstill import SpinWatch
-from bentwing.odometry.segments import HEAD, JUDGED, MAX_IMU_GAP, Break, found_again
+from bentwing.odometry.segments import JUDGED, MAX_IMU_GAP, found_again
 from bentwing.odometry.stall import LOST_AFTER
 from bentwing.odometry.start import Start, find_start, level_start
 from bentwing.recording import LidarBatch
@@ -64,7 +66,7 @@ class Continuous:
         self._is_planar = True
         self._spin = SpinWatch(by_encoder=payload.encoder is not None)
         self._stalled: tuple[OdometryPass, float] | None = None
-        self._notes: list[str] = []
+        self._breaks: list[Break] = []
 
     def feed(self, batch: Batch) -> None:
         """Take the next batch; windows that have become complete are registered."""
@@ -99,13 +101,12 @@ class Continuous:
             There is no second of lidar data.
         """
         self._advance(finishing=True)
+        found = self.so_far()
         lidar, imu = self._buffer.lidar_span, self._buffer.imu_span
-        if lidar is not None and imu is not None and lidar[1] > imu[1] + MAX_IMU_GAP:
-            self._notes.append(
-                f"the inertial data end at {imu[1]:.2f} s, {lidar[1] - imu[1]:.1f} s before the "
-                "lidar's: what the lidar saw after that is left out"
-            )
-        return self.so_far()
+        if lidar is None or imu is None or lidar[1] <= imu[1] + MAX_IMU_GAP:
+            return found
+        left_out = Break("inertial", imu[1], lidar[1], "left out")
+        return replace(found, breaks=[*found.breaks, left_out])
 
     def so_far(self) -> Estimate:
         """Return what the windows registered so far say.
@@ -122,7 +123,7 @@ class Continuous:
                     f"less than {self._sliding.shift:g} s of lidar points; nothing can be estimated"
                 )
                 raise NotEnoughDataError(msg)
-            return estimate_of(self._before, self._mount, self._notes)
+            return estimate_of(self._before, self._mount, self._breaks)
         return self.estimate(done)
 
     @property
@@ -268,7 +269,7 @@ class Continuous:
             return False
         (before, broken), self._bridged, self._stalled = self._bridged, None, None
         found = found_again(self._pass.windows, broken)
-        self._notes.append(broken.sentence(bridged=found))
+        self._breaks.append(replace(broken, outcome="bridged") if found else broken)
         if found:
             return False
         self._buffer.cut(broken.stop)
@@ -279,4 +280,4 @@ class Continuous:
 
     def estimate(self, last: OdometryPass) -> Estimate:
         """Return what the passes before the last break and this one say, levelled."""
-        return estimate_of([*self._before, last], self._mount, self._notes)
+        return estimate_of([*self._before, last], self._mount, self._breaks)

@@ -5,13 +5,14 @@ from __future__ import annotations
 
 import time
 from copy import copy, deepcopy
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bentwing import _core
 from bentwing.base import geometry
 from bentwing.base.trajectory import DT, Trajectory
+from bentwing.base.window_record import WindowRecord
 from bentwing.odometry.continuous.final_poses import FinalPoses
 from bentwing.odometry.continuous.slow_states import SlowStatePrior, named_std
 from bentwing.odometry.continuous.views import FixedViews
@@ -58,7 +59,7 @@ class OdometryPass:
         self.samples = samples
         self.globals = slow
         self.prior = prior
-        self.windows: list[dict[str, Any]] = []
+        self.windows: list[WindowRecord] = []
         self.n_blind = 0
         self._settings = settings
         self._core = core
@@ -208,33 +209,33 @@ class OdometryPass:
         self.prior.carry(result.covariance, result.offset, min(new, length), length)
         self.windows.append(self._record(result))
 
-    def _record(self, result: _core.Registration) -> dict[str, Any]:
+    def _record(self, result: _core.Registration) -> WindowRecord:
         translation = list(result.translation_eigenvalues)
         rotation = list(result.rotation_eigenvalues)
         n_matches = result.n_matches + result.n_fixed_matches
         degenerate = n_matches == 0 or min(translation[0], rotation[0]) < MIN_EIGENVALUE
-        return {
-            "time": self._end,
-            "n_surfels": result.n_surfels,
-            "n_matches": result.n_matches,
-            "n_fixed_matches": result.n_fixed_matches,
-            "inlier_share": result.inlier_share,
-            "residual_rms": result.residual_rms,
-            "iterations": result.n_outer,
-            "converged": result.converged,
-            "degenerate": degenerate,
-            "weakest_direction": list(result.weakest_direction) if degenerate else None,
-            "translation_eigenvalues": translation,
-            "rotation_eigenvalues": rotation,
-            "n_blind": result.n_blind,
-            "latency": self.globals.latency,
-            "gyro_bias": self.globals.gyro_bias.tolist(),
-            "accel_bias": self.globals.accel_bias.tolist(),
-            "gravity": self.globals.gravity.tolist(),
-            "extrinsic_translation": self.globals.base_translation.tolist(),
-            "extrinsic_quat_xyzw": self.globals.base_quat_xyzw.tolist(),
-            "std": named_std(self.covariance, self.prior.frozen),
-        }
+        return WindowRecord(
+            time=self._end,
+            n_surfels=result.n_surfels,
+            n_matches=result.n_matches,
+            n_fixed_matches=result.n_fixed_matches,
+            inlier_share=result.inlier_share,
+            residual_rms=result.residual_rms,
+            iterations=result.n_outer,
+            converged=result.converged,
+            degenerate=degenerate,
+            weakest_direction=list(result.weakest_direction) if degenerate else None,
+            translation_eigenvalues=translation,
+            rotation_eigenvalues=rotation,
+            n_blind=result.n_blind,
+            latency=self.globals.latency,
+            gyro_bias=self.globals.gyro_bias.tolist(),
+            accel_bias=self.globals.accel_bias.tolist(),
+            gravity=self.globals.gravity.tolist(),
+            extrinsic_translation=self.globals.base_translation.tolist(),
+            extrinsic_quat_xyzw=self.globals.base_quat_xyzw.tolist(),
+            std=named_std(self.covariance, self.prior.frozen),
+        )
 
     def _retire(self) -> None:
         """Freeze what has left the window, and forget what no view can need any more."""

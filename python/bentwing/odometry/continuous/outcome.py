@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,18 +18,22 @@ from bentwing.odometry.segments import joined
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from bentwing.base.breaks import Break
     from bentwing.base.mount import Mount
+    from bentwing.base.window_record import WindowRecord
     from bentwing.odometry.continuous.odometry_pass import OdometryPass
 
 
-def estimate_of(passes: Sequence[OdometryPass], described: Mount, notes: list[str]) -> Estimate:
+def estimate_of(
+    passes: Sequence[OdometryPass], described: Mount, breaks: Sequence[Break]
+) -> Estimate:
     """Return what passes that follow each other say, levelled.
 
     Parameters
     ----------
     passes : at least one; between two of them the recording breaks
     described : the mount as the payload has it
-    notes : sentences to add to the warnings
+    breaks : that were judged
     """
     segments, last = [p.trajectory() for p in passes], passes[-1]
     windows = [w for p in passes for w in p.windows]
@@ -52,14 +56,15 @@ def estimate_of(passes: Sequence[OdometryPass], described: Mount, notes: list[st
             "estimate.samples_without_imu": n_blind,
         },
         timings={name: sum(p.timings[name] for p in passes) for name in last.timings},
-        warnings=_warnings(windows, n_blind) + notes,
+        health=_health(windows, n_blind),
+        breaks=[*breaks],
         segments=[(float(s.times[0]), float(s.times[-1])) for s in segments],
     )
 
 
-def _warnings(windows: list[dict[str, Any]], n_blind: int) -> list[str]:
+def _health(windows: Sequence[WindowRecord], n_blind: int) -> list[str]:
     sentences = []
-    degenerate = [w["time"] for w in windows if w["degenerate"]]
+    degenerate = [w.time for w in windows if w.degenerate]
     if degenerate:
         sentences.append(
             f"{len(degenerate)} of {len(windows)} windows see too little in some direction "

@@ -32,6 +32,7 @@ from bentwing.recording.described import described_mount
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from bentwing.base.breaks import Break
     from bentwing.base.estimate import Estimate
     from bentwing.base.trajectory import Trajectory
     from bentwing.odometry.buffer import LidarStretch
@@ -92,7 +93,7 @@ class Kalman:
         self._n_small = 0
         self._lidar_end = 0.0
         self._angle: float | None = None
-        self._notes: list[str] = []
+        self._breaks: list[Break] = []
 
     def feed(self, batch: Batch) -> None:
         """Take the next batch; sweeps that have become complete are worked in."""
@@ -145,12 +146,12 @@ class Kalman:
             )
             raise NotEnoughDataError(msg)
         if (current := self.current) is None:
-            return estimate_of(self._before, self._notes, self._n_small)
+            return estimate_of(self._before, self._breaks, self._n_small)
         return self.estimate(self._snapshot(current))
 
     def estimate(self, last: FilterSnapshot) -> Estimate:
         """Return what the passes before the last break and this one say, levelled."""
-        return estimate_of([*self._before, last], self._notes, self._n_small)
+        return estimate_of([*self._before, last], self._breaks, self._n_small)
 
     @property
     def current(self) -> FilterPass | None:
@@ -237,7 +238,7 @@ class Kalman:
         if self._rehearsing and finishing and self._passes[-1].windows:
             return self._begin_again()
         if broken is not None and broken.start <= ready:
-            return self._pass_break(broken.start, broken.stop, broken.sentence(bridged=False))
+            return self._pass_break(broken)
         return False
 
     def _begin(self, lidar: float, imu: tuple[float, float], *, finishing: bool) -> bool:
@@ -301,12 +302,11 @@ class Kalman:
         self._n_small = 0
         return True
 
-    def _pass_break(self, start: float, stop: float, sentence: str) -> bool:
+    def _pass_break(self, broken: Break) -> bool:
         """Forget what is before a silence; what follows begins anew."""
-        del start
-        self._notes.append(sentence)
+        self._breaks.append(broken)
         self._before.append(self._snapshot(self._passes[-1]))
-        self._buffer.cut(stop)
+        self._buffer.cut(broken.stop)
         self._first = None
         return True
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bentwing import _core
 from bentwing.base import geometry
+from bentwing.base.window_record import WindowRecord
 from bentwing.odometry.kalman.core import SLOW, FilterState
 from bentwing.odometry.kalman.learned import calibration_of
 from bentwing.odometry.kalman.snapshot import FilterSnapshot, joined_poses
@@ -77,7 +78,7 @@ class FilterPass:
         self.start = time
         # Of the motor, or the fixed lidar, as the map begins: what the frame hangs on.
         self.anchor = _composed(state.pose, state.base)
-        self.windows: list[dict[str, Any]] = []
+        self.windows: list[WindowRecord] = []
         self.blind = 0.0
         self.seconds = 0.0
         # rad/s, of the motor, where it turned last.
@@ -173,31 +174,31 @@ class FilterPass:
             self.motor_rate = turned / float(sweep.times[-1] - sweep.times[0])
 
 
-def record_of(stop: float, n_points: int, found: _core.KalmanSweep) -> dict[str, Any]:
+def record_of(stop: float, n_points: int, found: _core.KalmanSweep) -> WindowRecord:
     """Return the record of a sweep, as `Estimate.windows` holds it."""
     shift, turn = found.eigenvalues
     matches, lines = found.n_matches
     planar, edges = found.n_features
     matched = found.matched
-    return {
-        "time": stop,
-        "n_surfels": found.n_planes,
-        "n_points": n_points,
-        "n_planar": planar,
-        "n_edges": edges,
-        "n_matches": matches,
-        "n_line_matches": lines,
-        "registered": matched,
-        "new_share": found.new_share,
-        "inlier_share": found.inlier_share if matched else None,
-        "residual_rms": found.residual_rms if matched else None,
-        "registration_rmse": found.rmse if matched else None,
-        "iterations": found.n_iterations,
-        "converged": found.converged,
-        "degenerate": not matched or min(shift[0], turn[0]) < LEAST_SHARE,
-        "translation_eigenvalues": shift,
-        "rotation_eigenvalues": turn,
-    }
+    return WindowRecord(
+        time=stop,
+        n_surfels=found.n_planes,
+        n_points=n_points,
+        n_planar=planar,
+        n_edges=edges,
+        n_matches=matches,
+        n_line_matches=lines,
+        registered=matched,
+        new_share=found.new_share,
+        inlier_share=found.inlier_share if matched else None,
+        residual_rms=found.residual_rms if matched else None,
+        registration_rmse=found.rmse if matched else None,
+        iterations=found.n_iterations,
+        converged=found.converged,
+        degenerate=not matched or min(shift[0], turn[0]) < LEAST_SHARE,
+        translation_eigenvalues=list(shift),
+        rotation_eigenvalues=list(turn),
+    )
 
 
 def _composed(pose: Transform, inner: Transform) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from bentwing.base.estimate import Estimate
 from bentwing.base.trajectory import DT
@@ -12,6 +12,8 @@ from bentwing.odometry.segments import joined
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from bentwing.base.breaks import Break
+    from bentwing.base.window_record import WindowRecord
     from bentwing.odometry.kalman.snapshot import FilterSnapshot
 
 # More of the sweeps than this are worth a sentence.
@@ -22,13 +24,14 @@ WEAK = 3.0
 BLIND = 0.3
 
 
-def estimate_of(passes: Sequence[FilterSnapshot], notes: list[str], n_small: int) -> Estimate:
+def estimate_of(
+    passes: Sequence[FilterSnapshot], breaks: Sequence[Break], n_small: int
+) -> Estimate:
     """Return what passes that follow each other say, level and from the origin on.
 
     Parameters
     ----------
-    passes : between two of them the recording breaks
-    notes : sentences to add to the warnings
+    passes, breaks : between two passes the recording breaks
     n_small : sweeps with too few points
     """
     parts = [p.trajectory() for p in passes if p.windows]
@@ -40,19 +43,20 @@ def estimate_of(passes: Sequence[FilterSnapshot], notes: list[str], n_small: int
         windows=windows,
         counts={
             "kalman.sweeps": len(windows),
-            "kalman.sweeps_not_matched": sum(not w["registered"] for w in windows),
+            "kalman.sweeps_not_matched": sum(not w.registered for w in windows),
             "kalman.sweeps_too_small": n_small,
         },
         timings={"filter": sum(p.seconds for p in passes)},
-        warnings=_warnings(windows, blind) + notes,
+        health=_health(windows, blind),
+        breaks=[*breaks],
         segments=[(float(p.times[0]), float(p.times[-1])) for p in parts],
     )
 
 
-def _warnings(windows: list[dict[str, Any]], blind: float) -> list[str]:
+def _health(windows: Sequence[WindowRecord], blind: float) -> list[str]:
     sentences = []
     # The first sweep makes the map.
-    lost = [w["time"] for w in windows[1:] if not w["registered"]]
+    lost = [w.time for w in windows[1:] if not w.registered]
     if len(lost) > FEW * len(windows):
         sentences.append(
             f"{len(lost)} of {len(windows)} sweeps match too little of what was seen before (first "
@@ -69,14 +73,14 @@ def _warnings(windows: list[dict[str, Any]], blind: float) -> list[str]:
     return sentences
 
 
-def _longest_weakness(windows: list[dict[str, Any]]) -> tuple[float, float]:
+def _longest_weakness(windows: Sequence[WindowRecord]) -> tuple[float, float]:
     """Return first and last time of the longest stretch of degenerate sweeps."""
     longest, since = (0.0, 0.0), None
     for w in windows:
-        if not (w["registered"] and w["degenerate"]):
+        if not (w.registered and w.degenerate):
             since = None
             continue
-        since = w["time"] if since is None else since
-        if w["time"] - since > longest[1] - longest[0]:
-            longest = since, w["time"]
+        since = w.time if since is None else since
+        if w.time - since > longest[1] - longest[0]:
+            longest = since, w.time
     return longest

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bentwing.base.calibration import Calibration
+    from bentwing.base.window_record import WindowRecord
 
     Poses = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
 
@@ -45,7 +46,7 @@ class FilterSnapshot:
     end: float
     gravity: NDArray[np.float64]
     calibration: Calibration
-    windows: list[dict[str, Any]]
+    windows: list[WindowRecord]
     poses: list[Poses]
     blind: float
     seconds: float

@@ -4,11 +4,12 @@
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bentwing.base import geometry
+from bentwing.base.breaks import SCAN, Break
 from bentwing.base.errors import NotEnoughDataError
 from bentwing.base.estimate import Estimate
 from bentwing.base.mount import FixedMount, MotorMount, Pose
@@ -21,9 +22,9 @@ from bentwing.odometry.ndt.matching import Match, Matcher
 from bentwing.odometry.ndt.motion import REST, Placed, Track
 from bentwing.odometry.ndt.outcome import (
     calibration_of,
+    health_of,
     levelled_trajectory,
     record_of,
-    warnings_of,
 )
 from bentwing.odometry.ndt.scans import Scan
 from bentwing.odometry.ndt.settings import NdtSettings
@@ -33,6 +34,7 @@ from bentwing.recording.described import described_mount
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from bentwing.base.window_record import WindowRecord
     from bentwing.recording import Batch, Payload
 
 # Fewer points are no scan.
@@ -77,10 +79,10 @@ class Ndt:
         self._tracks: list[Track] = []
         # The first scan of the newest track.
         self._opening: Scan | None = None
-        self._windows: list[dict[str, Any]] = []
+        self._windows: list[WindowRecord] = []
         self._n_small = 0
         self._seconds = 0.0
-        self._notes: list[str] = []
+        self._breaks: list[Break] = []
 
     def feed(self, batch: Batch) -> None:
         """Take the next batch; scans that have become complete are registered."""
@@ -120,16 +122,17 @@ class Ndt:
         counts = {
             "ndt.scans": len(self._windows) + 1,
             "ndt.keyframes": self._keyframes.n_keyframes,
-            "ndt.scans_not_registered": sum(not w["registered"] for w in self._windows),
+            "ndt.scans_not_registered": sum(not w.registered for w in self._windows),
             "ndt.scans_too_small": self._n_small,
         }
         return Estimate(
             trajectory,
             self._calibration,
-            windows=self._windows,
+            windows=[*self._windows],
             counts=counts,
             timings={**self._matcher.timings, "keyframes": self._seconds},
-            warnings=warnings_of(self._windows) + self._notes,
+            health=health_of(self._windows),
+            breaks=[*self._breaks],
             segments=segments,
         )
 
@@ -203,11 +206,7 @@ class Ndt:
 
     def _lose(self, scan: Scan, track: Track) -> None:
         """Begin anew where the last motion leads."""
-        self._notes.append(
-            f"no scan from {track.last.time:.2f} to {scan.time:.2f} s fits what was seen before: the "
-            "trajectory begins anew there, in the direction of the last motion; what follows is "
-            "consistent in itself, but its place relative to what came before is a guess"
-        )
+        self._breaks.append(Break(SCAN, track.last.time, scan.time))
         self._begin(scan, track.expected(scan.time))
 
     def _lidar(self, scan: Scan, pose: Placed) -> Placed:

@@ -3,16 +3,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bentwing.base import geometry
 from bentwing.base.calibration import STANDARD_GRAVITY, Calibration
 from bentwing.base.trajectory import DT, Trajectory
+from bentwing.base.window_record import WindowRecord
 from bentwing.odometry.segments import joined
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from bentwing.base.mount import Mount
     from bentwing.odometry.ndt.levelling import Levelling
     from bentwing.odometry.ndt.matching import Match
@@ -55,48 +58,42 @@ def levelled_trajectory(
     return joined(level, DT), segments
 
 
-def record_of(time: float, n_surfaces: int, match: Match | None) -> dict[str, Any]:
-    """Return the record of a scan, as `Estimate.windows` holds it.
-
-    `registration_rmse` is the root mean square distance from the surfaces of the reference, m
-    (Tazir 2020, figure 13).
-    """
-    record: dict[str, Any] = {
-        "time": time,
-        "n_surfels": n_surfaces,
-        "registered": match is not None,
-    }
+def record_of(time: float, n_surfaces: int, match: Match | None) -> WindowRecord:
+    """Return the record of a scan, as `Estimate.windows` holds it."""
     if match is None:
-        return record | {
-            "n_points": 0, "n_matches": 0, "inlier_share": None, "residual_rms": None,
-            "registration_rmse": None, "iterations": 0, "converged": False, "degenerate": True,
-        }  # fmt: skip
+        return WindowRecord(
+            time=time, n_surfels=n_surfaces, n_points=0, n_matches=0, registered=False,
+            inlier_share=None, residual_rms=None, iterations=0, converged=False, degenerate=True,
+        )  # fmt: skip
     found = match.registration
     shift, turn = found.translation_eigenvalues, found.rotation_eigenvalues
-    return record | {
-        "n_points": match.n_points,
-        "n_matches": found.n_matched,
-        "inlier_share": found.inlier_share,
-        "residual_rms": found.residual_rms,
-        "registration_rmse": found.rmse,
-        "iterations": found.n_iterations,
-        "converged": found.converged,
-        "degenerate": min(shift[0], turn[0]) < LEAST_SHARE,
-        "translation_eigenvalues": shift,
-        "rotation_eigenvalues": turn,
-    }
+    return WindowRecord(
+        time=time,
+        n_surfels=n_surfaces,
+        n_points=match.n_points,
+        n_matches=found.n_matched,
+        registered=True,
+        inlier_share=found.inlier_share,
+        residual_rms=found.residual_rms,
+        registration_rmse=found.rmse,
+        iterations=found.n_iterations,
+        converged=found.converged,
+        degenerate=min(shift[0], turn[0]) < LEAST_SHARE,
+        translation_eigenvalues=list(shift),
+        rotation_eigenvalues=list(turn),
+    )
 
 
-def warnings_of(windows: list[dict[str, Any]]) -> list[str]:
-    """Return sentences about the health of the estimate."""
+def health_of(windows: Sequence[WindowRecord]) -> list[str]:
+    """Return sentences about what makes the estimate worse than usual."""
     sentences = []
-    lost = [w["time"] for w in windows if not w["registered"]]
+    lost = [w.time for w in windows if not w.registered]
     if lost:
         sentences.append(
             f"{len(lost)} of {len(windows)} scans fit nowhere near where they were expected "
             f"(first at {lost[0]:.1f} s): the motion went on at constant velocity there"
         )
-    weak = [w["time"] for w in windows if w["registered"] and w["degenerate"]]
+    weak = [w.time for w in windows if w.registered and w.degenerate]
     if len(weak) > FEW * len(windows):
         sentences.append(
             f"{len(weak)} of {len(windows)} scans see too little in some direction (first at "

@@ -6,6 +6,7 @@ from bentwing.base.calibration import Calibration
 from bentwing.base.estimate import Estimate
 from bentwing.base.mount import FixedMount, Pose
 from bentwing.base.trajectory import Trajectory
+from bentwing.base.window_record import WindowRecord
 from bentwing.closing.global_registration.biases import drift_of, has_inertial_states
 
 
@@ -20,7 +21,11 @@ def estimate(windows, std):
 
 
 def window(time, bias, std):
-    return {"time": time, "gyro_bias": [bias] * 3, "std": {"gyro_bias": [std] * 3}}
+    return WindowRecord(
+        time=time, gyro_bias=[bias] * 3, std={"gyro_bias": [std] * 3},
+        n_surfels=0, n_matches=0, inlier_share=None, residual_rms=None,
+        iterations=1, converged=True, degenerate=False,
+    )  # fmt: skip
 
 
 def test_only_what_is_known_as_well_as_at_the_end_is_history():

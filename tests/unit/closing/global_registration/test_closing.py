@@ -83,7 +83,7 @@ def test_a_slow_drift_is_taken_out(closed):
     assert off(closed.estimate.trajectory) < 0.004
     assert closed.record["largest_translation"] == pytest.approx(off(bent(truth())), rel=0.1)
     assert closed.record["n_revisits"] > 0
-    assert not closed.estimate.warnings
+    assert not closed.warnings
 
 
 def test_the_result_does_not_depend_on_threads(closed):
@@ -123,7 +123,7 @@ def test_what_does_not_settle_is_left_as_it_was():
     assert not found.record["applied"]
     assert "did not settle in 1 iterations" in found.record["reason"]
     assert np.array_equal(found.estimate.trajectory.positions, given.trajectory.positions)
-    assert "the trajectory is open-loop" in found.estimate.warnings[0]
+    assert "the trajectory is open-loop" in found.warnings[0]
 
 
 def test_a_recording_without_points_is_left_as_it_was():
@@ -163,4 +163,4 @@ def test_a_registration_with_a_map_that_fails_does_not_call_the_trajectory_open_
         estimate(bent(truth())), scans(), PAYLOAD, settings=settings, known=known, threads=2
     )
     assert not found.record["applied"]
-    assert "not registered with the map" in found.estimate.warnings[0]
+    assert "not registered with the map" in found.warnings[0]

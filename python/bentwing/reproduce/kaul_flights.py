@@ -12,7 +12,7 @@ import numpy as np
 import yaml
 
 from bentwing.base.clock import NS_PER_S, format_ns
-from bentwing.base.mount import FixedMount, Pose
+from bentwing.base.mount import mount_from_json
 from bentwing.base.trajectory import Trajectory, read_tum
 from bentwing.map.chunk import MapChunk
 from bentwing.map.project import project
@@ -168,9 +168,9 @@ def write_best_map(flown: Flown, assignment: Assignment, truth: Trajectory) -> P
     if estimate is None:
         msg = f"the run of the {flown.plan.name} has no estimate"
         raise ValueError(msg)
-    mount = true["T_imu_lidar"]
-    pose = Pose(np.array(mount["translation"]), np.array(mount["quaternion"]))
-    calibration = replace(estimate.calibration, latency=true["latency"], mount=FixedMount(pose))
+    calibration = replace(
+        estimate.calibration, latency=true["latency"], mount=mount_from_json(true)
+    )
     path = flown.files.recording.parent / "best_map.las"
     payload = Payload.load(flown.files.payload)
     with Recording(flown.files.recording, payload) as recording:

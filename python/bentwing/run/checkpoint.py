@@ -18,12 +18,10 @@ from bentwing.base.atomic import write_bytes
 from bentwing.base.calibration import Calibration
 from bentwing.base.errors import UsageError
 from bentwing.base.estimate import Estimate
-from bentwing.base.mount import FixedMount, MotorMount, Pose
 from bentwing.base.plain import plain
 from bentwing.base.trajectory import Trajectory
 
 if TYPE_CHECKING:
-    from bentwing.base.mount import Mount
     from bentwing.run.folder import RunFolder
     from bentwing.run.run import Run
 
@@ -111,7 +109,9 @@ class Checkpoint:
         trajectory = Trajectory(*(arrays[name] for name in _TRAJECTORY))
         fields = described["estimate"]
         fields["segments"] = [(first, last) for first, last in fields["segments"]]
-        run.estimate = Estimate(trajectory, read_calibration(described["calibration"]), **fields)
+        run.estimate = Estimate(
+            trajectory, Calibration.from_json(described["calibration"]), **fields
+        )
         run.spin_times, run.spin_rates = arrays["spin"].tolist()
         self._folder.record.update(described["record"])
         for name in (*described["files"], NAME):
@@ -139,25 +139,3 @@ class Checkpoint:
                 "give the same, or leave --resume out to begin anew"
             )
             raise UsageError(msg)
-
-
-def read_calibration(described: dict[str, Any]) -> Calibration:
-    """Return a calibration as run.json describes it."""
-    vectors = {name: np.array(described[name]) for name in ("gyro_bias", "accel_bias", "gravity")}
-    mount = _mount(described["mount"])
-    return Calibration(described["latency"], mount, **vectors, std=described["std"])
-
-
-def _mount(described: dict[str, Any]) -> Mount:
-    if "T_imu_lidar" in described:
-        return FixedMount(_pose(described["T_imu_lidar"]))
-    return MotorMount(
-        _pose(described["T_imu_motor"]),
-        np.array(described["axis"]),
-        described["encoder_zero"],
-        _pose(described["T_motor_lidar"]),
-    )
-
-
-def _pose(described: dict[str, Any]) -> Pose:
-    return Pose(np.array(described["translation"]), np.array(described["quat_xyzw"]))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 
+from bentwing.base.calibration import Calibration
 from bentwing.base.errors import InputError, UsageError
 from bentwing.base.estimate import Estimate
 from bentwing.base.provenance import describe_input
@@ -16,7 +17,6 @@ from bentwing.base.run_record import read_record
 from bentwing.base.trajectory import DT, read_tum
 from bentwing.odometry.segments import joined
 from bentwing.recording import Payload
-from bentwing.run.checkpoint import read_calibration
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -145,7 +145,7 @@ def _estimate(folder: Path, record: dict[str, Any]) -> Estimate:
         raise InputError(msg)
     return Estimate(
         joined(segments, DT),
-        read_calibration(record["calibration"]),
+        Calibration.from_json(record["calibration"]),
         windows=record.get("windows") or [],
         segments=[_span(part) for part in segments],
     )

@@ -31,11 +31,11 @@ COLUMNS = (
 def errors(motor, axis, truth: dict, pose) -> np.ndarray:
     """Angles, rad, and shifts, m, across the axis by which `pose` is wrong; along it nothing can be."""
     quat, shift = (np.array(truth[name]) for name in ("quaternion", "translation"))
-    apart = geometry.multiply(pose.quat_xyzw, geometry.inverse(quat))
+    apart = geometry.multiply(pose.quaternion, geometry.inverse(quat))
     about = np.append(axis * (apart[:3] @ axis), apart[3])
     about /= np.linalg.norm(about)
     quat, shift = geometry.multiply(about, quat), geometry.rotate(about, shift)
-    turn = geometry.log(geometry.multiply(pose.quat_xyzw, geometry.inverse(quat)))
+    turn = geometry.log(geometry.multiply(pose.quaternion, geometry.inverse(quat)))
     return np.concatenate([motor.across @ turn, motor.across @ (pose.translation - shift)])
 
 
@@ -49,7 +49,7 @@ def run(scenario: Scenario, folder: Path) -> dict:
     truth, motor = yaml.safe_load(files.calibration.read_text()), found.motor
     axis, believed = np.array(payload.encoder.axis), payload.encoder.T_motor_lidar
     mount = truth["encoder"]["T_motor_lidar"]
-    before = errors(motor, axis, mount, _pose(believed))
+    before = errors(motor, axis, mount, believed.pose)
     after = errors(motor, axis, mount, motor.T_motor_lidar)
     parts = [slice(0, 2), slice(2, 4)]
     nees = [after[p] @ np.linalg.solve(motor.covariance[p, p], after[p]) for p in parts]
@@ -58,12 +58,6 @@ def run(scenario: Scenario, folder: Path) -> dict:
         "before": before, "after": after, "std": motor.std, "delay": delay, "nees": nees,
         "pairs": motor.n_pairs,
     }  # fmt: skip
-
-
-def _pose(transform):
-    from bentwing.base.mount import Pose
-
-    return Pose(np.array(transform.translation), np.array(transform.quaternion))
 
 
 def line(scenario: Scenario, row: dict) -> str:

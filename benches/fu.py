@@ -103,7 +103,7 @@ def true_anchor(engine, truth, calibration: dict, payload: Payload):
         about /= np.linalg.norm(about)
         along = axis * (axis @ (behind - np.array(believed.T_motor_lidar.translation)))
         shift = shift + geometry.rotate(quat, along)
-        zero = geometry.exp(axis * calibration["encoder_zero"])
+        zero = geometry.exp(axis * encoder["zero"])
         quat = geometry.multiply(quat, geometry.multiply(zero, about))
     return geometry.compose(positions[0], quats[0], shift), geometry.multiply(quats[0], quat)
 
@@ -119,7 +119,7 @@ def consistency(engine, estimate, truth, truly) -> dict:
     inside = (times <= estimate.trajectory.times[-1]) & truth.covers(times) & (times > take_off)
     times, covariances = times[inside], covariances[inside]
     _, anchor = engine.anchor()
-    hung = anchor.translation, anchor.quat_xyzw
+    hung = anchor.translation, anchor.quaternion
     errors = pose_errors_from(hung, truly, estimate.trajectory, truth, times)
     since = pose_errors_since(take_off, estimate.trajectory, truth, times[-1:])
     positions, _ = estimate.trajectory.interpolate(times)

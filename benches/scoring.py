@@ -159,7 +159,7 @@ def best_points(
     if "encoder" in true:
         # Read at the stamps of the lidar; the motor was there at the true times.
         read = np.unwrap(np.concatenate([b.angles for b in lidar]))
-        angles = np.interp(times[chosen], times + true["latency"], read) + true["encoder_zero"]
+        angles = np.interp(times[chosen], times + true["latency"], read) + true["encoder"]["zero"]
         in_motor = moved_by(true["encoder"]["T_motor_lidar"], points[chosen])
         turns = geometry.exp(angles[:, None] * np.array(payload.encoder.axis))
         in_imu = moved_by(true["encoder"]["T_imu_motor"], geometry.rotate(turns, in_motor))
@@ -185,7 +185,7 @@ def calibration_errors(found: dict, true: dict) -> dict[str, np.ndarray]:
     if "T_imu_lidar" in true:
         mount, described = found["mount"]["T_imu_lidar"], true["T_imu_lidar"]
         back = geometry.inverse(np.array(described["quaternion"]))
-        turn = geometry.multiply(np.array(mount["quat_xyzw"]), back)
+        turn = geometry.multiply(np.array(mount["quaternion"]), back)
         errors["extrinsic_rotation"] = geometry.log(turn)
         errors["extrinsic_translation"] = np.subtract(
             mount["translation"], described["translation"]

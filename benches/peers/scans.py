@@ -55,9 +55,9 @@ def half_turns(times: np.ndarray, rates: np.ndarray) -> np.ndarray:
 
 def by_encoder(points: np.ndarray, angles: np.ndarray, encoder) -> np.ndarray:
     """Points (N, 3) of the lidar in the IMU frame, by the motor's angles (N,) and nominal mounts."""
-    in_motor = moved(encoder.T_motor_lidar.matrix, points)
-    turns = geometry.exp(angles[:, None] * np.array(encoder.axis))
-    return moved(encoder.T_imu_motor.matrix, geometry.rotate(turns, in_motor))
+    in_motor = moved(encoder.T_motor_lidar.pose.matrix, points)
+    turns = geometry.exp((angles + encoder.zero)[:, None] * np.array(encoder.axis))
+    return moved(encoder.T_imu_motor.pose.matrix, geometry.rotate(turns, in_motor))
 
 
 def moved(T: np.ndarray, points: np.ndarray) -> np.ndarray:

@@ -75,7 +75,7 @@ def test_frozen_states_stay_exactly_at_their_start(run, head):
     mount, found = head.payload.T_imu_lidar, estimate.calibration
     assert found.latency == 0.0
     assert tuple(found.mount.T_imu_lidar.translation) == mount.translation
-    assert found.mount.T_imu_lidar.quat_xyzw == pytest.approx(mount.quaternion, abs=1e-15)
+    assert found.mount.T_imu_lidar.quaternion == pytest.approx(mount.quaternion, abs=1e-15)
     for key in ("latency", "gyro_bias", "accel_bias", "gravity", "extrinsic_quat_xyzw"):
         values = np.array([getattr(w, key) for w in estimate.windows])
         assert (values == values[0]).all(), key

@@ -10,9 +10,12 @@ import numpy as np
 import pytest
 
 from bentwing import odometry
+from bentwing.base import geometry
 from bentwing.base.errors import EstimationError, NotEnoughDataError, PayloadError, UsageError
+from bentwing.base.mount import Pose
 from bentwing.base.window_record import WindowRecord
 from bentwing.recording import ImuBatch, LidarBatch
+from bentwing.recording.payload import Encoder, Transform
 
 
 def all_bytes(estimate):
@@ -24,7 +27,7 @@ def all_bytes(estimate):
         trajectory.quats_xyzw.tobytes(),
         calibration.latency,
         calibration.mount.T_imu_lidar.translation.tobytes(),
-        calibration.mount.T_imu_lidar.quat_xyzw.tobytes(),
+        calibration.mount.T_imu_lidar.quaternion.tobytes(),
         calibration.gyro_bias.tobytes(),
         calibration.accel_bias.tobytes(),
         json.dumps(calibration.std),
@@ -205,3 +208,31 @@ def test_without_an_imu_in_the_payload_the_lidar_stands_for_it(head, name):
     assert np.isfinite(estimate.trajectory.positions).all()
     assert estimate.calibration.latency == 0.0
     assert estimate.calibration.mount.T_imu_lidar.translation.tolist() == [0.0, 0.0, 0.0]
+
+
+def test_a_lidar_behind_the_zero_of_its_encoder_is_where_it_is_without(quick, head, name):
+    """The zero turns the lidar by as much as the mount behind the motor turns it back."""
+    until = 7.0  # s; the motor does not move
+    batches = [b for b in head.batches if b.times[-1] < until]
+    batches = [
+        replace(b, angles=np.zeros(len(b.times))) if isinstance(b, LidarBatch) else b
+        for b in batches
+    ]
+    lidar = head.payload.T_imu_lidar.pose
+    found = []
+    for zero in (0.0, 1.2):
+        back = Pose(np.zeros(3), geometry.exp(np.array([-zero, 0.0, 0.0]))) @ lidar
+        transform = Transform(
+            translation=back.translation.tolist(), quaternion=back.quaternion.tolist()
+        )
+        encoder = Encoder(axis=(1.0, 0.0, 0.0), zero=zero, T_motor_lidar=transform)
+        payload = head.payload.model_copy(update={"T_imu_lidar": None, "encoder": encoder})
+        engine = odometry.create(name, payload, quick[name], 1)
+        for batch in batches:
+            engine.feed(batch)
+        found.append(engine.result())
+    without, behind = found
+    apart = behind.trajectory.positions - without.trajectory.positions
+    assert np.abs(apart).max() < 1e-3
+    mounts = [estimate.calibration.mount.lidar_at(0.0).matrix for estimate in found]
+    assert np.abs(mounts[1] - mounts[0]).max() < 1e-3

@@ -116,7 +116,7 @@ def test_the_mounts_are_found_within_what_is_stated(turned, turning):
     true = yaml.safe_load((turning / "truth_calibration.yaml").read_text())
     found = estimate.calibration
     described = np.array(true["encoder"]["T_motor_lidar"]["quaternion"])
-    turn = geometry.multiply(found.mount.T_motor_lidar.quat_xyzw, geometry.inverse(described))
+    turn = geometry.multiply(found.mount.T_motor_lidar.quaternion, geometry.inverse(described))
     assert np.abs(geometry.log(turn)[:2]).max() < 1.5e-3  # rad; before: 4
     assert found.latency == pytest.approx(true["latency"], abs=1e-3)
     assert max(found.std["motor_tilt"]) < 1e-3

@@ -4,15 +4,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bentwing.base.mount import mount_from_json
 
 if TYPE_CHECKING:
-    import numpy as np
+    from collections.abc import Mapping
+
     from numpy.typing import NDArray
 
     from bentwing.base.mount import Mount
 
 STANDARD_GRAVITY = 9.80665  # m/s²
+_VECTORS = ("gyro_bias", "accel_bias", "gravity")
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,3 +44,19 @@ class Calibration:
     accel_bias: NDArray[np.float64]
     gravity: NDArray[np.float64]
     std: dict[str, list[float]] = field(default_factory=dict)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the calibration as run.json has it; the mount as payload.yaml does."""
+        return {
+            "latency": self.latency,
+            "mount": self.mount.to_json(),
+            **{name: getattr(self, name).tolist() for name in _VECTORS},
+            "std": self.std,
+        }
+
+    @classmethod
+    def from_json(cls, described: Mapping[str, Any]) -> Calibration:
+        """Read the calibration in a run.json, of earlier versions as well."""
+        vectors = {name: np.array(described[name], float) for name in _VECTORS}
+        mount = mount_from_json(described["mount"])
+        return cls(described["latency"], mount, **vectors, std=described["std"])

@@ -13,10 +13,10 @@ import numpy as np
 
 def plain(value: Any) -> Any:  # noqa: ANN401 - takes and returns whatever JSON can hold
     """Turn dataclasses, arrays, models and paths into JSON types; what is not finite into None."""
-    if hasattr(value, "model_dump"):
-        return plain(value.model_dump())
     if hasattr(value, "to_json"):
         return plain(value.to_json())
+    if hasattr(value, "model_dump"):
+        return plain(value.model_dump())
     if is_dataclass(value) and not isinstance(value, type):
         return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
     if isinstance(value, dict):

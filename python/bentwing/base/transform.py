@@ -13,6 +13,13 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
+def rigid(R: NDArray[np.float64], t: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Put rotations (..., 3, 3) and translations (..., 3) together to transforms (..., 4, 4)."""
+    T = np.zeros((*np.shape(R)[:-2], 4, 4))
+    T[..., :3, :3], T[..., :3, 3], T[..., 3, 3] = R, t, 1.0
+    return T
+
+
 def upright(yaw: float, shift: NDArray[np.float64]) -> NDArray[np.float64]:
     """Turn by `yaw` (rad) about the vertical, then shift by (3,) m."""
     T = np.eye(4)
@@ -30,9 +37,7 @@ def apply(T: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.flo
 def inverse(T: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the inverse of a rigid transform."""
     R, t = T[:3, :3], T[:3, 3]
-    result = np.eye(4)
-    result[:3, :3], result[:3, 3] = R.T, -R.T @ t
-    return result
+    return rigid(R.T, -R.T @ t)
 
 
 def turned_and_shifted(
@@ -40,7 +45,4 @@ def turned_and_shifted(
 ) -> NDArray[np.float64]:
     """`T` perturbed on the left by (6,) rotation first, the rotation being about a point (3,)."""
     R = geometry.to_matrices(geometry.exp(tangent[:3]))
-    result = np.eye(4)
-    result[:3, :3] = R @ T[:3, :3]
-    result[:3, 3] = R @ (T[:3, 3] - about) + about + tangent[3:]
-    return result
+    return rigid(R @ T[:3, :3], R @ (T[:3, 3] - about) + about + tangent[3:])

@@ -139,7 +139,7 @@ def calibrate_motor(
     """
     across = np.linalg.svd(axis[None])[2][1:]
     n_sweeps = int(seen.sweeps.max()) + 1
-    x = _Unknowns(T_motor_lidar.matrix, T_motor_lidar.translation.copy(), 0.0, np.zeros(n_sweeps))
+    x = _Unknowns(T_motor_lidar.R, T_motor_lidar.translation.copy(), 0.0, np.zeros(n_sweeps))
     given = _Given(axis, across, T_motor_lidar, _prior(seen, n_sweeps))
     before = 0.0
     covariance, pairs, rms = np.zeros((N_SHARED, N_SHARED)), None, 0.0
@@ -159,7 +159,7 @@ def calibrate_motor(
         if fine and moved < LAST_STEP:
             break
     quat = geometry.from_matrices(x.R)
-    turn = geometry.log(geometry.multiply(quat, geometry.inverse(T_motor_lidar.quat_xyzw)))
+    turn = geometry.log(geometry.multiply(quat, geometry.inverse(T_motor_lidar.quaternion)))
     if not np.linalg.norm(turn) < MAX_ANGLE:
         msg = (
             f"the half-scans fit best with the lidar turned by {np.degrees(np.linalg.norm(turn)):.0f}° "
@@ -183,7 +183,7 @@ def calibrate_motor(
 def place(seen: Revolutions, axis: Array, lidar: Pose, delay: float, turns: Array) -> Array:
     """Return the points (N, 3) in the frame in which the motor stands, m."""
     angles = seen.angles - seen.rates * delay + turns[seen.sweeps]
-    return turned(axis, angles, seen.points @ lidar.matrix.T + lidar.translation)
+    return turned(axis, angles, seen.points @ lidar.R.T + lidar.translation)
 
 
 def turned(axis: Array, angles: Array, points: Array) -> Array:
@@ -368,7 +368,7 @@ def _apply(x: _Unknowns, step: Array, across: Array) -> None:
 
 def _away(x: _Unknowns, across: Array, believed: Pose) -> Array:
     """Return how far angles and offsets (4,) are from what was believed."""
-    quat = geometry.multiply(geometry.from_matrices(x.R), geometry.inverse(believed.quat_xyzw))
+    quat = geometry.multiply(geometry.from_matrices(x.R), geometry.inverse(believed.quaternion))
     return np.concatenate([across @ geometry.log(quat), across @ (x.t - believed.translation)])
 
 

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bentwing.base import geometry
-from bentwing.base.mount import FixedMount, Pose
+from bentwing.base.mount import FixedMount
 from bentwing.calibrate.motor_mount import OFFSET_PRIOR
 from bentwing.recording.payload import CalibrationRecord, Transform
 
 if TYPE_CHECKING:
     from bentwing.base.calibration import Calibration
+    from bentwing.base.mount import Pose
     from bentwing.calibrate.motor_mount import MotorCalibration
     from bentwing.calibrate.revolution import Stretch
     from bentwing.calibrate.wall import WallSection
@@ -94,10 +94,7 @@ def with_motor(payload: Payload, motor: MotorCalibration) -> Payload:
 
 
 def with_motion(payload: Payload, found: Calibration) -> Payload:
-    """Return the payload with what motion has told.
-
-    The zero of the encoder becomes a turn of the lidar about the axis, which is the same.
-    """
+    """Return the payload with what motion has told."""
     known = payload.calibration or CalibrationRecord()
     names = ["latency", "extrinsic_rotation", "extrinsic_translation"]
     update: dict[str, Any] = {
@@ -108,15 +105,11 @@ def with_motion(payload: Payload, found: Calibration) -> Payload:
         update["T_imu_lidar"] = _transform(mount.T_imu_lidar)
     else:
         assert payload.encoder is not None
-        zero = geometry.exp(mount.encoder_zero * mount.axis)
-        behind = Pose(
-            geometry.rotate(zero, mount.T_motor_lidar.translation),
-            geometry.multiply(zero, mount.T_motor_lidar.quat_xyzw),
-        )
         update["encoder"] = payload.encoder.model_copy(
             update={
                 "T_imu_motor": _transform(mount.T_imu_motor),
-                "T_motor_lidar": _transform(behind),
+                "zero": round(mount.encoder_zero, DIGITS),
+                "T_motor_lidar": _transform(mount.T_motor_lidar),
             }
         )
         names += [n for n in ("motor_tilt", "motor_offset") if n not in known.std]
@@ -160,7 +153,7 @@ def as_record(found: Calibrated) -> dict[str, Any]:
 def _transform(pose: Pose) -> Transform:
     x, y, z = (round(float(v), DIGITS) for v in pose.translation)
     # A quaternion that is rounded is renormalized on entry.
-    a, b, c, d = (round(float(v), 12) for v in pose.quat_xyzw)
+    a, b, c, d = (round(float(v), 12) for v in pose.quaternion)
     return Transform(translation=(x, y, z), quaternion=(a, b, c, d))
 
 

@@ -29,7 +29,7 @@ def page(plan: Plan) -> Iterator[RenderableType]:
     """Yield the parts of the page, top to bottom."""
     pattern = plan.pattern
     yield (
-        f"head       {_HOW[plan.mount.turned]}; {pattern.rate_hz:g} sweeps per second, "
+        f"head       {_HOW[plan.turning.turned]}; {pattern.rate_hz:g} sweeps per second, "
         f"{pattern.n_lines} line(s), beams {math.degrees(pattern.beam_step):.2f}° apart"
     )
     yield from _spin(plan)
@@ -45,7 +45,7 @@ def as_record(plan: Plan) -> dict[str, Any]:
     """Return the plan in degrees, metres and seconds."""
     spin = plan.spin
     return {
-        "turned": plan.mount.turned,
+        "turned": plan.turning.turned,
         "spin_rate_deg": None if spin is None else _rates(plan),
         "rate_deg": math.degrees(plan.rate),
         "spacings": [

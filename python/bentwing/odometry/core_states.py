@@ -80,4 +80,4 @@ def core_samples(trajectory: Trajectory) -> _core.Samples:
 
 
 def _pair(pose: Pose) -> tuple[list[float], list[float]]:
-    return pose.translation.tolist(), pose.quat_xyzw.tolist()
+    return pose.translation.tolist(), pose.quaternion.tolist()

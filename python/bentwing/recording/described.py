@@ -12,19 +12,20 @@ from bentwing.base.mount import FixedMount, MotorMount, Pose
 
 if TYPE_CHECKING:
     from bentwing.base.mount import Mount
-    from bentwing.recording.payload import Payload, Transform
+    from bentwing.recording.payload import Payload
 
 
 def described_mount(payload: Payload) -> Mount:
     """Return the mount as the payload describes it; without a description the frames coincide."""
     encoder = payload.encoder
     if encoder is None:
-        return FixedMount(_pose(payload.T_imu_lidar))
+        fixed = payload.T_imu_lidar
+        return FixedMount(Pose.identity() if fixed is None else fixed.pose)
     return MotorMount(
-        T_imu_motor=_pose(encoder.T_imu_motor),
+        T_imu_motor=encoder.T_imu_motor.pose,
         axis=np.array(encoder.axis),
-        encoder_zero=0.0,
-        T_motor_lidar=_pose(encoder.T_motor_lidar),
+        encoder_zero=encoder.zero,
+        T_motor_lidar=encoder.T_motor_lidar.pose,
     )
 
 
@@ -37,9 +38,3 @@ def described_calibration(payload: Payload) -> Calibration:
         accel_bias=np.zeros(3),
         gravity=np.array([0.0, 0.0, STANDARD_GRAVITY]),
     )
-
-
-def _pose(transform: Transform | None) -> Pose:
-    if transform is None:
-        return Pose.identity()
-    return Pose(np.array(transform.translation), np.array(transform.quaternion))

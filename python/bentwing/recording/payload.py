@@ -23,6 +23,7 @@ from pydantic import (
 )
 
 from bentwing.base.errors import PayloadError
+from bentwing.base.mount import Pose
 from bentwing.recording.lidar_kinds import KIND_DEFAULTS, LidarKind, VelodyneModel
 from bentwing.recording.payload_errors import describe
 
@@ -35,6 +36,7 @@ NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Vector = tuple[Finite, Finite, Finite]
 Quaternion = tuple[Finite, Finite, Finite, Finite]
 Offset = Annotated[float, Field(ge=-0.5, le=0.5, allow_inf_nan=False)]  # s, between two clocks
+Angle = Annotated[float, Field(ge=-2 * np.pi, le=2 * np.pi, allow_inf_nan=False)]  # rad
 Topic = Annotated[str, Field(min_length=1)]
 
 MAX_LEVER = 10.0  # m; a sensor farther away on the same carrier is a mistake of units
@@ -80,17 +82,9 @@ class Transform(_Section):
         return x, y, z, w
 
     @property
-    def matrix(self) -> NDArray[np.float64]:
-        """(4, 4) float64, homogeneous."""
-        x, y, z, w = self.quaternion
-        matrix = np.eye(4)
-        matrix[:3, :3] = [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-        matrix[:3, 3] = self.translation
-        return matrix
+    def pose(self) -> Pose:
+        """The transform as arrays."""
+        return Pose(np.array(self.translation), np.array(self.quaternion))
 
 
 class Lidar(_Section):
@@ -172,14 +166,17 @@ class SelfHit(_Section):
 
 
 class Encoder(_Section):
-    """The motor that turns the lidar: T_imu_lidar(θ) = T_imu_motor · Rot(axis, θ) · T_motor_lidar.
+    """The motor that turns the lidar, whose encoder reads θ.
 
-    `axis` is a unit vector in the motor frame (normalized on entry). `delay`: at a stamp of the lidar
-    the encoder's angle is that of this much earlier, s.
+    `T_imu_lidar(θ) = T_imu_motor · Rot(axis, θ + zero) · T_motor_lidar`
+
+    axis : unit vector in the motor frame (normalized on entry); zero : rad
+    delay : s, at a stamp of the lidar the encoder's angle is that of this much earlier
     """
 
     topic: Topic | None = None
     axis: Vector = (0.0, 0.0, 1.0)
+    zero: Angle = 0.0
     T_imu_motor: Transform = Transform()
     T_motor_lidar: Transform = Transform()
     delay: Offset = 0.0
@@ -277,7 +274,7 @@ class Payload(_Section):
 
     def T_imu_lidar_matrix(self) -> NDArray[np.float64]:
         """(4, 4) of the fixed mount; the identity where none is given (no IMU)."""
-        return np.eye(4) if self.T_imu_lidar is None else self.T_imu_lidar.matrix
+        return np.eye(4) if self.T_imu_lidar is None else self.T_imu_lidar.pose.matrix
 
 
 def _read_yaml(path: Path) -> object:

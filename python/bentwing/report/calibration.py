@@ -8,11 +8,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bentwing.base import geometry
+from bentwing.base.calibration import Calibration
+from bentwing.base.mount import FixedMount
 from bentwing.report.sections import DASH, table
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
+    from bentwing.base.mount import Mount, Pose
 
 DEGREES = 180 / np.pi
 
@@ -21,13 +24,14 @@ def calibration_table(calibration: Mapping[str, Any] | None) -> str:
     """Make the table of latency, extrinsics and biases with their standard deviations."""
     if not calibration:
         return '<p class="none">Not recorded.</p>'
-    std = calibration.get("std") or {}
+    found = Calibration.from_json(calibration)
+    std = found.std
     rows = [
-        _row("lidar latency, ms", [calibration["latency"]], std.get("latency"), 1e3, 3),
-        *_mount_rows(calibration["mount"], std),
-        _row("gyro bias, °/s", calibration["gyro_bias"], std.get("gyro_bias"), DEGREES, 4),
-        _row("accelerometer bias, m/s²", calibration["accel_bias"], std.get("accel_bias"), 1.0, 4),
-        _row("gravity in the map, m/s²", calibration["gravity"], None, 1.0, 4),
+        _row("lidar latency, ms", [found.latency], std.get("latency"), 1e3, 3),
+        *_mount_rows(found.mount, std),
+        _row("gyro bias, °/s", found.gyro_bias, std.get("gyro_bias"), DEGREES, 4),
+        _row("accelerometer bias, m/s²", found.accel_bias, std.get("accel_bias"), 1.0, 4),
+        _row("gravity in the map, m/s²", found.gravity, None, 1.0, 4),
     ]
     if std.get("gravity"):
         rows.append(_row("direction of gravity, °", [0.0, 0.0], std["gravity"], DEGREES, 3))
@@ -35,35 +39,33 @@ def calibration_table(calibration: Mapping[str, Any] | None) -> str:
     return table(head, rows, numbers=frozenset({1, 2}))
 
 
-def _mount_rows(mount: Mapping[str, Any], std: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+def _mount_rows(mount: Mount, std: Mapping[str, list[float]]) -> list[tuple[str, str, str]]:
     base_std = std.get("extrinsic_translation"), std.get("extrinsic_rotation")
-    if "T_imu_lidar" in mount:
-        return _pose_rows("lidar in IMU", mount["T_imu_lidar"], *base_std)
-    zero = [mount["encoder_zero"]]
+    if isinstance(mount, FixedMount):
+        return _pose_rows("lidar in IMU", mount.T_imu_lidar, *base_std)
+    motor_std = std.get("motor_offset"), std.get("motor_tilt")
     return [
-        *_pose_rows("motor in IMU", mount["T_imu_motor"], *base_std),
-        _row("encoder zero, °", zero, std.get("encoder_zero"), DEGREES, 3),
-        *_pose_rows(
-            "lidar in motor", mount["T_motor_lidar"], std.get("motor_offset"), std.get("motor_tilt")
-        ),
+        *_pose_rows("motor in IMU", mount.T_imu_motor, *base_std),
+        _row("encoder zero, °", [mount.encoder_zero], std.get("encoder_zero"), DEGREES, 3),
+        *_pose_rows("lidar in motor", mount.T_motor_lidar, *motor_std),
     ]
 
 
 def _pose_rows(
     name: str,
-    pose: Mapping[str, Any],
+    pose: Pose,
     translation_std: Sequence[float] | None,
     rotation_std: Sequence[float] | None,
 ) -> list[tuple[str, str, str]]:
-    rotation = geometry.log(np.array(pose["quat_xyzw"], float)).tolist()
+    rotation = geometry.log(pose.quaternion)
     return [
-        _row(f"{name}, mm (x, y, z)", pose["translation"], translation_std, 1e3, 1),
+        _row(f"{name}, mm (x, y, z)", pose.translation, translation_std, 1e3, 1),
         _row(f"{name}, rotation vector, °", rotation, rotation_std, DEGREES, 3),
     ]
 
 
 def _row(
-    name: str, values: Sequence[float], std: Sequence[float] | None, unit: float, digits: int
+    name: str, values: Iterable[float], std: Sequence[float] | None, unit: float, digits: int
 ) -> tuple[str, str, str]:
     deviations = DASH if std is None else "   ".join(f"± {unit * s:.{digits}f}" for s in std)
     return name, "   ".join(f"{unit * v:.{digits}f}" for v in values), deviations

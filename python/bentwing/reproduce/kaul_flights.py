@@ -12,7 +12,7 @@ import numpy as np
 import yaml
 
 from bentwing.base.clock import NS_PER_S, format_ns
-from bentwing.base.mount import FixedMount, Pose
+from bentwing.base.mount import mount_from_json
 from bentwing.base.trajectory import Trajectory, read_tum
 from bentwing.map.chunk import MapChunk
 from bentwing.map.project import project
@@ -172,9 +172,9 @@ def write_best_map(flown: Flown, assignment: Assignment, truth: Trajectory) -> P
     """Write the map that true poses and calibration make: nothing but the lidar's noise is in it."""
     true = yaml.safe_load(flown.files.calibration.read_text(encoding="utf-8"))
     estimate = flown.run.estimate
-    mount = true["T_imu_lidar"]
-    pose = Pose(np.array(mount["translation"]), np.array(mount["quaternion"]))
-    calibration = replace(estimate.calibration, latency=true["latency"], mount=FixedMount(pose))
+    calibration = replace(
+        estimate.calibration, latency=true["latency"], mount=mount_from_json(true)
+    )
     path = flown.files.recording.parent / "best_map.las"
     payload = Payload.load(flown.files.payload)
     with Recording(flown.files.recording, payload) as recording:

@@ -14,7 +14,7 @@ import yaml
 from bentwing import odometry
 from bentwing.base.calibration import Calibration
 from bentwing.base.errors import BentwingError
-from bentwing.base.mount import FixedMount, MotorMount, Pose
+from bentwing.base.mount import mount_from_json
 from bentwing.base.trajectory import Trajectory, read_tum
 from bentwing.map.project import project
 from bentwing.recording import LidarBatch, Payload, Recording
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bentwing.base.estimate import Estimate
-    from bentwing.base.mount import Mount
     from bentwing.odometry.interface import Estimator
 
     Array = NDArray[np.float64]
@@ -108,19 +107,8 @@ def attempt(
 def true_calibration(folder: Path) -> Calibration:
     """Return the latency and the mounts as the simulated head truly has them."""
     true = yaml.safe_load((folder / "truth_calibration.yaml").read_text(encoding="utf-8"))
-    encoder = Payload.load(folder / "payload.yaml").encoder
-    mount: Mount
-    if encoder is None:
-        mount = FixedMount(_pose(true["T_imu_lidar"]))
-    else:
-        mount = MotorMount(
-            _pose(true["encoder"]["T_imu_motor"]),
-            np.array(encoder.axis, np.float64),
-            true["encoder_zero"],
-            _pose(true["encoder"]["T_motor_lidar"]),
-        )
     none = np.zeros(3)
-    return Calibration(true["latency"], mount, none, none, none)
+    return Calibration(true["latency"], mount_from_json(true), none, none, none)
 
 
 def points_of(
@@ -135,10 +123,6 @@ def motor_stopped(lidar: Sequence[LidarBatch]) -> list[LidarBatch]:
     """Give all returns the motor's first angle, as if it stood still; none without a motor."""
     turned = [(b, b.angles) for b in lidar if b.angles is not None and len(b.angles)]
     return [replace(b, angles=np.full(len(b.times), turned[0][1][0])) for b, _ in turned]
-
-
-def _pose(described: dict[str, list[float]]) -> Pose:
-    return Pose(np.array(described["translation"]), np.array(described["quaternion"]))
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,14 +19,12 @@ from bentwing.base.breaks import Break
 from bentwing.base.calibration import Calibration
 from bentwing.base.errors import UsageError
 from bentwing.base.estimate import Estimate
-from bentwing.base.mount import FixedMount, MotorMount, Pose
 from bentwing.base.plain import plain
 from bentwing.base.trajectory import Trajectory
 from bentwing.base.window_record import WindowRecord
 from bentwing.run.found import Found, Reading, Spin
 
 if TYPE_CHECKING:
-    from bentwing.base.mount import Mount
     from bentwing.run.folder import RunFolder
 
 NAME = "checkpoint.npz"
@@ -144,31 +142,9 @@ def _found(arrays: dict[str, Any], described: dict[str, Any]) -> Found:
     fields["breaks"] = [Break(**broken) for broken in fields["breaks"]]
     trajectory = Trajectory(*(arrays[name] for name in _TRAJECTORY))
     return Found(
-        Estimate(trajectory, read_calibration(described["calibration"]), **fields),
+        Estimate(trajectory, Calibration.from_json(described["calibration"]), **fields),
         Reading(**described["reading"]),
         Spin(*arrays["spin"].tolist()),
         **described["corrections"],
         notes=tuple(described["notes"]),
     )
-
-
-def read_calibration(described: dict[str, Any]) -> Calibration:
-    """Return a calibration as run.json describes it."""
-    vectors = {name: np.array(described[name]) for name in ("gyro_bias", "accel_bias", "gravity")}
-    mount = _mount(described["mount"])
-    return Calibration(described["latency"], mount, **vectors, std=described["std"])
-
-
-def _mount(described: dict[str, Any]) -> Mount:
-    if "T_imu_lidar" in described:
-        return FixedMount(_pose(described["T_imu_lidar"]))
-    return MotorMount(
-        _pose(described["T_imu_motor"]),
-        np.array(described["axis"]),
-        described["encoder_zero"],
-        _pose(described["T_motor_lidar"]),
-    )
-
-
-def _pose(described: dict[str, Any]) -> Pose:
-    return Pose(np.array(described["translation"]), np.array(described["quat_xyzw"]))

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from bentwing.base.calibration import Calibration
 from bentwing.base.errors import InputError, UsageError
 from bentwing.base.estimate import Estimate
 from bentwing.base.run_record import read_record
 from bentwing.base.trajectory import DT, read_tum
 from bentwing.base.window_record import WindowRecord
 from bentwing.odometry.segments import joined
-from bentwing.run.checkpoint import read_calibration
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -104,7 +104,7 @@ def estimate_of(folder: Path, record: Mapping[str, Any]) -> Estimate:
         raise InputError(msg)
     return Estimate(
         joined(segments, DT),
-        read_calibration(record["calibration"]),
+        Calibration.from_json(record["calibration"]),
         windows=[WindowRecord.from_json(window) for window in record.get("windows") or []],
         segments=[(float(part.times[0]), float(part.times[-1])) for part in segments],
     )

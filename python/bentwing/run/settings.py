@@ -47,7 +47,7 @@ class MapSettings(BaseModel):
 
     def to_json(self) -> dict[str, Any]:
         """Return the settings in plain JSON types, as run.json has them."""
-        described: dict[str, Any] = plain(self)
+        described: dict[str, Any] = plain(self.model_dump())
         return described
 
 

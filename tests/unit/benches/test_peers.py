@@ -107,7 +107,7 @@ def test_points_by_encoder_stand_still_while_the_motor_turns() -> None:
 def _mount(encoder, angle):
     turn = np.eye(4)
     turn[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
-    return encoder.T_imu_motor.matrix @ turn @ encoder.T_motor_lidar.matrix
+    return encoder.T_imu_motor.pose.matrix @ turn @ encoder.T_motor_lidar.pose.matrix
 
 
 def test_an_organised_sweep_has_a_place_for_every_shot() -> None:

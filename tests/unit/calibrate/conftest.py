@@ -19,7 +19,7 @@ SWEEP = 0.1  # s
 
 def perturbed(rotation, shift):
     """The nominal place of the lidar, turned (motor frame, rad) and shifted (m)."""
-    quat = geometry.multiply(geometry.exp(np.asarray(rotation)), NOMINAL.quat_xyzw)
+    quat = geometry.multiply(geometry.exp(np.asarray(rotation)), NOMINAL.quaternion)
     return Pose(NOMINAL.translation + shift, quat)
 
 
@@ -47,7 +47,7 @@ def revolution(true, *, rate=2.0, n_turns=1, n=40_000, sigma=0.0, delay=0.0, see
     )
     at_true = angles - speeds * delay
     origins = turned(AXIS, at_true, np.tile(true.translation, (len(times), 1)))
-    ranges = distance(origins, turned(AXIS, at_true, beams @ true.matrix.T))
+    ranges = distance(origins, turned(AXIS, at_true, beams @ true.R.T))
     points = beams * (ranges + rng.normal(0.0, 1.0, len(ranges)) * sigma)[:, None]
     return Revolutions(
         points,

@@ -18,11 +18,11 @@ SHIFT = st.floats(-0.005, 0.005)
 
 def errors(found, true, axis):
     """Angles (rad) and shifts (m) across the axis by which a calibration is wrong (4,)."""
-    apart = geometry.multiply(found.T_motor_lidar.quat_xyzw, geometry.inverse(true.quat_xyzw))
+    apart = geometry.multiply(found.T_motor_lidar.quaternion, geometry.inverse(true.quaternion))
     about = np.append(axis * (apart[:3] @ axis), apart[3])
     about /= np.linalg.norm(about)
-    quat, t = geometry.multiply(about, true.quat_xyzw), geometry.rotate(about, true.translation)
-    left = geometry.multiply(found.T_motor_lidar.quat_xyzw, geometry.inverse(quat))
+    quat, t = geometry.multiply(about, true.quaternion), geometry.rotate(about, true.translation)
+    left = geometry.multiply(found.T_motor_lidar.quaternion, geometry.inverse(quat))
     return np.concatenate(
         [found.across @ geometry.log(left), found.across @ (found.T_motor_lidar.translation - t)]
     )
@@ -42,7 +42,7 @@ def test_what_is_along_the_axis_stays_as_it_was(room):
     true = room.perturbed([0.004, -0.003, 0.01], [0.002, 0.001, 0.02])
     found = calibrate_motor(room.revolution(true), room.axis, room.nominal, sigma=0.01)
     turn = geometry.multiply(
-        found.T_motor_lidar.quat_xyzw, geometry.inverse(room.nominal.quat_xyzw)
+        found.T_motor_lidar.quaternion, geometry.inverse(room.nominal.quaternion)
     )
     assert abs(geometry.log(turn) @ room.axis) < 1e-4  # of second order
     shift = found.T_motor_lidar.translation - room.nominal.translation

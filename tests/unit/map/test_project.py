@@ -65,9 +65,9 @@ def test_a_motor_turned_lidar_goes_through_mount_axis_and_zero():
     motor = Pose(np.array([0.1, 0.0, 0.2]), R_IMU_LIDAR)
     lever = Pose(np.array([0.0, 0.02, 0.0]), geometry.exp(np.array([0, 0.2, 0])))
     angles = 7.0 * stamps
-    points = undone(motor.translation, motor.quat_xyzw, seen_in_imu(stamps))
+    points = undone(motor.translation, motor.quaternion, seen_in_imu(stamps))
     points = geometry.rotate(geometry.exp(-(angles + zero)[:, None] * axis), points)
-    points = undone(lever.translation, lever.quat_xyzw, points)
+    points = undone(lever.translation, lever.quaternion, points)
     batch = LidarBatch(points, stamps, angles=angles)
     mount = MotorMount(motor, axis, zero, lever)
     (chunk,) = project([batch], trajectory(), calibration(mount=mount))

@@ -36,7 +36,7 @@ def test_the_documented_example_is_read(tmp_path):
     payload = load(tmp_path, EXAMPLE)
     assert payload.lidar.topic == "/scan"
     assert payload.imu.gyro_noise == 5.0e-4
-    np.testing.assert_array_equal(payload.T_imu_lidar.matrix[:3, 3], [0.03, 0.0, -0.05])
+    np.testing.assert_array_equal(payload.T_imu_lidar.pose.matrix[:3, 3], [0.03, 0.0, -0.05])
     assert payload.self_hits[0].box.max == (0.4, 0.4, 0.5)
     assert payload.encoder.axis == (0.0, 0.0, 1.0)
     assert payload.gnss.topic == "/fix"
@@ -131,14 +131,14 @@ def test_quaternions_rounded_to_three_digits_are_normalized(tmp_path):
     text = "T_imu_lidar: {quaternion: [0.5005, 0.5, 0.5, 0.5]}"
     transform = load(tmp_path, text).T_imu_lidar
     assert np.linalg.norm(transform.quaternion) == pytest.approx(1.0, abs=1e-15)
-    R = transform.matrix[:3, :3]
+    R = transform.pose.matrix[:3, :3]
     np.testing.assert_allclose(R @ R.T, np.eye(3), atol=1e-14)
 
 
 def test_the_matrix_turns_as_the_hamilton_quaternion_says(tmp_path):
     half = np.sqrt(0.5)
     text = f"T_imu_lidar: {{quaternion: [0, 0, {half}, {half}]}}"
-    R = load(tmp_path, text).T_imu_lidar.matrix[:3, :3]
+    R = load(tmp_path, text).T_imu_lidar.pose.matrix[:3, :3]
     np.testing.assert_allclose(R @ [1, 0, 0], [0, 1, 0], atol=1e-12)
 
 

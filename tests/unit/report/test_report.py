@@ -26,7 +26,7 @@ RECORD = {
     "peak_memory_mb": 512.0,
     "calibration": {
         "latency": 0.00213,
-        "mount": {"T_imu_lidar": {"translation": [0.0312, 0, -0.05], "quat_xyzw": [0, 0, 0, 1]}},
+        "mount": {"T_imu_lidar": {"translation": [0.0312, 0, -0.05], "quaternion": [0, 0, 0, 1]}},
         "gyro_bias": [0.001, 0.0, 0.0],
         "accel_bias": [0.02, 0.0, 0.0],
         "gravity": [0.0, 0.0, 9.81],
@@ -136,10 +136,10 @@ def test_numbers_appear_with_their_deviations(whole_page):
 
 
 def test_a_motor_mount_is_shown_with_its_three_parts():
-    pose = {"translation": [0.01, 0.0, 0.05], "quat_xyzw": [0.0, 0.0, 0.0, 1.0]}
-    mount = {"T_imu_motor": pose, "axis": [0, 0, 1], "encoder_zero": 0.01, "T_motor_lidar": pose}
+    pose = {"translation": [0.01, 0.0, 0.05], "quaternion": [0.0, 0.0, 0.0, 1.0]}
+    encoder = {"T_imu_motor": pose, "axis": [0, 0, 1], "zero": 0.01, "T_motor_lidar": pose}
     std = {"encoder_zero": [1e-4], "motor_tilt": [2e-4, 3e-4], "motor_offset": [1e-3, 2e-3]}
-    html = calibration_table({**RECORD["calibration"], "mount": mount, "std": std})
+    html = calibration_table({**RECORD["calibration"], "mount": {"encoder": encoder}, "std": std})
     for text in ("motor in IMU", "encoder zero", "0.573", "± 0.006", "lidar in motor", "± 2.0"):
         assert text in html, text
 

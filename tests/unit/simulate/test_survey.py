@@ -96,7 +96,7 @@ def test_a_calibrated_head_is_as_its_payload_says():
     head = setup.rig.head
     for name in ("T_imu_motor", "T_motor_lidar"):
         assert head.truth["encoder"][name] == head.payload["encoder"][name]
-    assert head.truth["encoder_zero"] == 0.0
+    assert head.truth["encoder"]["zero"] == 0.0
     assert setup.sensors.clock.latency == 0.0
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from bentwing.base.errors import UsageError
 from bentwing.flight.plan.patterns import PATTERNS, ScanPattern
-from bentwing.flight.plan.turning import Coverage, Mount, coverage, mount_of
+from bentwing.flight.plan.turning import Coverage, Turning, coverage, turning_of
 
 if TYPE_CHECKING:
     from bentwing.recording import Payload
@@ -100,7 +100,7 @@ class Plan:
 
     Attributes
     ----------
-    mount, pattern, intent : what was assumed
+    turning, pattern, intent : what was assumed
     spin : None for a lidar that is fixed
     rate : rad/s, the middle of the range (geometric), for which the spacings are given
     spacings : by range
@@ -109,7 +109,7 @@ class Plan:
     n_flights : batteries
     """
 
-    mount: Mount
+    turning: Turning
     pattern: ScanPattern
     intent: Intent
     spin: SpinRange | None
@@ -136,14 +136,14 @@ def plan_flight(payload: Payload, intent: Intent | None = None) -> Plan:
         )
         raise UsageError(msg)
     pattern = _pattern(payload, intent)
-    mount = mount_of(payload, pattern)
-    seen = coverage(mount, pattern)
-    spin = None if mount.turned == "fixed" else spin_range(pattern, seen.sweep, intent)
+    turning = turning_of(payload, pattern)
+    seen = coverage(turning, pattern)
+    spin = None if turning.turned == "fixed" else spin_range(pattern, seen.sweep, intent)
     rate = 0.0 if spin is None else math.sqrt(spin.lowest * spin.lines)
     reach = payload.lidar.max_range
     spacings = tuple(_spacing(pattern, rate, r) for r in RANGES if r <= reach)
     time, n_flights = site_time(intent)
-    return Plan(mount, pattern, intent, spin, rate, spacings, seen, time, n_flights)
+    return Plan(turning, pattern, intent, spin, rate, spacings, seen, time, n_flights)
 
 
 def spin_range(pattern: ScanPattern, sweep: float, intent: Intent) -> SpinRange:

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from bentwing.base import geometry
+from bentwing.base.mount import MotorMount
+from bentwing.recording.described import described_mount
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -27,7 +29,7 @@ _WHOLE = 0.995  # share of what is seen at all that counts as everything
 
 
 @dataclass(frozen=True, slots=True)
-class Mount:
+class Turning:
     """How the lidar is turned.
 
     Attributes
@@ -42,19 +44,19 @@ class Mount:
     R_imu_lidar: Array
 
 
-def mount_of(payload: Payload, pattern: ScanPattern) -> Mount:
+def turning_of(payload: Payload, pattern: ScanPattern) -> Turning:
     """Tell how a payload's lidar is turned.
 
     A 2D lidar without an encoder has to be moved with its IMU to see space: it is taken as spun
     about the IMU's z, which is what the downdraft does under a level carrier.
     """
-    if payload.encoder is not None:
-        encoder = payload.encoder
-        R_imu_motor = encoder.T_imu_motor.matrix[:3, :3]
-        R_motor_lidar = encoder.T_motor_lidar.matrix[:3, :3]
-        return Mount("motor", R_imu_motor @ np.array(encoder.axis), R_imu_motor @ R_motor_lidar)
+    mount = described_mount(payload)
+    if isinstance(mount, MotorMount):
+        mount = mount.with_zero_behind_motor()
+        R_imu_motor = mount.T_imu_motor.R
+        return Turning("motor", R_imu_motor @ mount.axis, R_imu_motor @ mount.T_motor_lidar.R)
     turned: Turned = "fixed" if pattern.n_lines > 1 else "downdraft"
-    return Mount(turned, np.array([0.0, 0.0, 1.0]), payload.T_imu_lidar_matrix()[:3, :3])
+    return Turning(turned, np.array([0.0, 0.0, 1.0]), mount.T_imu_lidar.R)
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,19 +78,19 @@ class Coverage:
     sweep: float
 
 
-def coverage(mount: Mount, pattern: ScanPattern) -> Coverage:
+def coverage(turning: Turning, pattern: ScanPattern) -> Coverage:
     """Turn the lidar's beams once around and mark where they look."""
-    beams = pattern.directions(_BEAM_STEP) @ mount.R_imu_lidar.T
-    turns = np.arange(0.0, 2 * np.pi, _TURN_STEP) if mount.turned != "fixed" else np.zeros(1)
+    beams = pattern.directions(_BEAM_STEP) @ turning.R_imu_lidar.T
+    turns = np.arange(0.0, 2 * np.pi, _TURN_STEP) if turning.turned != "fixed" else np.zeros(1)
     seen = np.zeros((N_ELEVATIONS, 2 * N_ELEVATIONS), bool)
     shares = np.empty(len(turns))
     weights = _cell_weights()
     for k, turn in enumerate(turns):
-        quat = geometry.exp(turn * mount.axis)
+        quat = geometry.exp(turn * turning.axis)
         _mark(seen, geometry.rotate(np.broadcast_to(quat, (len(beams), 4)), beams))
         shares[k] = float((seen * weights).sum())
     whole = int(np.argmax(shares >= _WHOLE * shares[-1]))
-    sweep = 0.0 if mount.turned == "fixed" else float(turns[whole] + _TURN_STEP)
+    sweep = 0.0 if turning.turned == "fixed" else float(turns[whole] + _TURN_STEP)
     up, down = _blind(seen[::-1]), _blind(seen)
     return Coverage(seen, float(shares[-1]), up, down, sweep)
 

@@ -207,9 +207,9 @@ def unlearned_delay(rate: float, mount: MotorMount, state: FilterState) -> NDArr
 
 def _mounts(mount: Mount) -> tuple[Pose, Pose]:
     if isinstance(mount, FixedMount):
-        return mount.T_imu_lidar, Pose(np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]))
+        return mount.T_imu_lidar, Pose.identity()
     return mount.T_imu_motor, mount.T_motor_lidar
 
 
 def _pair(pose: Pose) -> Transform:
-    return pose.translation.tolist(), pose.quat_xyzw.tolist()
+    return pose.translation.tolist(), pose.quaternion.tolist()

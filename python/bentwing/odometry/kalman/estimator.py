@@ -195,15 +195,13 @@ class Kalman:
 
     @property
     def _filter_mount(self) -> Mount:
-        """The mount as the filter takes it: a lidar whose rotation is ignored is fixed."""
+        """The mount as the filter takes it: without a zero, and fixed where its turning is ignored."""
         mount = self._mount
-        if isinstance(mount, FixedMount) or self.settings.rotation == "encoder":
+        if isinstance(mount, FixedMount):
             return mount
-        turn = geometry.exp((self._angle or 0.0) * mount.axis)
-        quat = geometry.multiply(mount.T_imu_motor.quat_xyzw, turn)
-        behind = mount.T_motor_lidar
-        at = geometry.compose(mount.T_imu_motor.translation, quat, behind.translation)
-        return FixedMount(Pose(at, geometry.multiply(quat, behind.quat_xyzw)))
+        if self.settings.rotation == "encoder":
+            return mount.with_zero_behind_motor()
+        return FixedMount(mount.lidar_at(self._angle or 0.0))
 
     def _snapshot(self, of: FilterPass) -> FilterSnapshot:
         return of.snapshot(self._filter_mount, is_settling=self._rehearsing)

@@ -33,7 +33,7 @@ def calibration_of(filter_: _core.KalmanFilter, motor_rate: float, mount: Mount)
     Parameters
     ----------
     motor_rate : rad/s, at which the motor turns
-    mount : as the payload describes it
+    mount : with which the filter began
     """
     std = np.sqrt(np.maximum(np.diag(filter_.covariance), 0.0))
     named = {

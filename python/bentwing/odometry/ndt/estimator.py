@@ -225,5 +225,5 @@ def _behind(pose: Placed, mounted: Pose) -> Placed:
     translation: NDArray[np.float64] = geometry.compose(
         pose.translation, pose.quat_xyzw, mounted.translation
     )
-    quat = geometry.multiply(pose.quat_xyzw, mounted.quat_xyzw)
+    quat = geometry.multiply(pose.quat_xyzw, mounted.quaternion)
     return Placed(pose.time, translation, quat)

@@ -74,9 +74,9 @@ def vlp16_motor(
     payload = {
         "lidar": _lidar(lidar),
         "self_hits": [SIDEWAYS],
-        "encoder": {"topic": "/encoder", "axis": AXIS.tolist(), **_motor(motor, nominal)},
+        "encoder": {"topic": "/encoder", **_motor(motor, nominal)},
     }
-    truth = {"encoder": _motor(true_motor, true), "encoder_zero": round(encoder.zero, 9)}
+    truth = {"encoder": {"zero": round(encoder.zero, 9), **_motor(true_motor, true)}}
     joints: list[Joint] = [true_motor, Turn(AXIS, angle), true]
     return Head([T_body_imu], joints, quadrotor(), lidar, payload, truth, encoder)
 
@@ -92,7 +92,11 @@ def _lidar(lidar: Vlp16) -> dict[str, Any]:
 
 
 def _motor(T_imu_motor: Mount, T_motor_lidar: Mount) -> dict[str, Any]:
-    return {"T_imu_motor": T_imu_motor.as_dict(), "T_motor_lidar": T_motor_lidar.as_dict()}
+    return {
+        "axis": AXIS.tolist(),
+        "T_imu_motor": T_imu_motor.as_dict(),
+        "T_motor_lidar": T_motor_lidar.as_dict(),
+    }
 
 
 def _motor_angle(rng: np.random.Generator, rate: float, drive: Array) -> Spline:

@@ -62,7 +62,7 @@ def test_nearer_structure_allows_faster_spinning_and_demands_it_at_speed(distanc
 
 def test_a_motor_turned_lidar_sees_all_around():
     made = plan(MOTOR)
-    assert made.mount.turned == "motor"
+    assert made.turning.turned == "motor"
     assert made.coverage.share == pytest.approx(1.0, abs=0.01)
     assert made.spin is not None
     assert math.degrees(made.spin.lines) == pytest.approx(10 * (30.0 + math.degrees(0.08)), abs=0.1)

@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from bentwing.base import geometry
+from bentwing.base.calibration import Calibration
+from bentwing.base.mount import FixedMount, MotorMount, Pose
+from bentwing.base.plain import plain
+
+POSE = Pose(np.array([0.03, -0.01, 0.05]), geometry.exp(np.array([0.1, -0.2, 0.3])))
+BEHIND = Pose(np.array([0.0, 0.02, -0.07]), geometry.exp(np.array([1.5, 0.1, 0.0])))
+MOTOR = MotorMount(POSE, np.array([0.0, 0.6, 0.8]), 0.25, BEHIND)
+MOUNTS = [FixedMount(POSE), MOTOR]
+
+
+def calibration(mount):
+    vectors = np.array([0.01, 0.0, -0.02]), np.array([0.1, 0.2, 0.3]), np.array([0.0, 0.0, 9.81])
+    return Calibration(0.002, mount, *vectors, std={"latency": [1e-5]})
+
+
+@pytest.mark.parametrize("mount", MOUNTS)
+def test_a_calibration_is_read_from_json_bit_for_bit(mount):
+    written = json.dumps(plain(calibration(mount)))
+    found = Calibration.from_json(json.loads(written))
+    assert type(found.mount) is type(mount)
+    assert json.dumps(found.to_json()) == written
+
+
+def test_a_calibration_in_the_run_json_of_an_earlier_version_is_read():
+    def earlier(pose):
+        return {"translation": pose.translation.tolist(), "quat_xyzw": pose.quaternion.tolist()}
+
+    motor = {
+        "T_imu_motor": earlier(POSE),
+        "axis": [0.0, 0.6, 0.8],
+        "encoder_zero": 0.25,
+        "T_motor_lidar": earlier(BEHIND),
+    }
+    for old, mount in zip([{"T_imu_lidar": earlier(POSE)}, motor], MOUNTS, strict=True):
+        now = calibration(mount).to_json()
+        assert Calibration.from_json({**now, "mount": old}).to_json() == now
+
+
+def test_a_zero_behind_the_motor_leaves_the_lidar_where_it_is():
+    moved = MOTOR.with_zero_behind_motor()
+    assert moved.encoder_zero == 0.0
+    for angle in (-2.0, 0.0, 0.7):
+        expected, found = MOTOR.lidar_at(angle), moved.lidar_at(angle)
+        np.testing.assert_allclose(found.matrix, expected.matrix, rtol=0, atol=1e-15)
+
+
+def test_the_lidar_is_behind_the_motor_at_the_angle_beyond_the_zero():
+    turn = np.eye(4)
+    turn[:3, :3] = geometry.to_matrices(geometry.exp(MOTOR.axis * (0.5 + 0.25)))
+    expected = POSE.matrix @ turn @ BEHIND.matrix
+    np.testing.assert_allclose(MOTOR.lidar_at(0.5).matrix, expected, rtol=0, atol=1e-15)

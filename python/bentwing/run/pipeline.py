@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 from bentwing import odometry
 from bentwing.base.progress import Progress
-from bentwing.closing.global_registration import GlobalSettings
 from bentwing.closing.localize import read_prior_map
 from bentwing.recording import Recording
 from bentwing.recording.preprocess import RecordingPart
@@ -156,7 +155,7 @@ def _open_inputs(job: stages.Job, payload_file: Path | str | None) -> PriorMap |
     with folder.stage("inputs"):
         described = [] if payload_file is None else [Path(payload_file)]
         folder.add_inputs([*recording.paths, *described])
-        known = None if prior is None else read_prior_map(prior, GlobalSettings().surfels)
+        known = None if prior is None else read_prior_map(prior, job.settings.closing.surfels)
         if known is not None:
             folder.add_inputs([known.file])
         folder.add_recordings(recording.paths, recording.clock.start_ns)

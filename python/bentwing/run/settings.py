@@ -58,10 +58,12 @@ class MergeSettings(MapSettings):
     ----------
     runs : folders of the runs
     flights : files of each flight by its name, where the flights are mapped first
+    loop_closure : how the runs are registered with each other
     """
 
     runs: tuple[Path, ...] = ()
     flights: dict[str, tuple[Path, ...]] = Field(default_factory=dict)
+    loop_closure: GlobalSettings = GlobalSettings()
 
 
 class RunSettings(MapSettings):
@@ -96,6 +98,11 @@ class RunSettings(MapSettings):
         """Settings of the estimator that is used."""
         chosen: EstimatorSettings = getattr(self, self.estimator)
         return chosen
+
+    @property
+    def closing(self) -> GlobalSettings:
+        """Settings of the registration that corrects the trajectory."""
+        return self.loop_closure or GlobalSettings()
 
     @property
     def closes_loops(self) -> bool:

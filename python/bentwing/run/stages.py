@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from bentwing.base.errors import EstimationError, NotEnoughDataError
 from bentwing.base.progress import Progress
 from bentwing.closing.georeference import georeference
-from bentwing.closing.global_registration import Budget, GlobalSettings, close_loops
+from bentwing.closing.global_registration import Budget, close_loops
 from bentwing.closing.joining.segments import close_segments
 from bentwing.closing.localize import Difference, NotInMapError, find_in_map
 from bentwing.map.project import project
@@ -77,7 +77,8 @@ def estimate(job: Job, engine: Estimator) -> Found:
 def close(job: Job, found: Found) -> Found:
     """Correct the trajectory by all that was seen more than once, or that a prior map shows."""
     open_loop, part, threads = _known(found), job.part, job.settings.threads
-    budget = Budget.of(part.length, GlobalSettings())
+    closing = job.settings.closing
+    budget = Budget.of(part.length, closing)
     job.progress.note(f"loops: {budget.sentence()}")
     if job.prior is not None:
         found = _localize(job, found, job.prior)
@@ -88,13 +89,24 @@ def close(job: Job, found: Found) -> Found:
         batches = part.batches(shown, Counter())  # the first pass has counted what is dropped
         if len(open_loop.segments) > 1 and job.prior is None:
             closed, merging = close_segments(
-                open_loop, batches, part.payload, budget=budget, threads=threads
+                open_loop,
+                batches,
+                part.payload,
+                settings=closing,
+                budget=budget,
+                threads=threads,
             )
             found = replace(found, merging=merging)
         else:
             near = None if job.prior is None else job.prior.surfels_near(open_loop.trajectory)
             closed = close_loops(
-                open_loop, batches, part.payload, budget=budget, known=near, threads=threads
+                open_loop,
+                batches,
+                part.payload,
+                settings=closing,
+                budget=budget,
+                known=near,
+                threads=threads,
             )
     return replace(
         found,

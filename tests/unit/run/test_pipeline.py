@@ -12,6 +12,7 @@ from bentwing.base.calibration import Calibration
 from bentwing.base.errors import EstimationError, UsageError
 from bentwing.base.estimate import Estimate
 from bentwing.base.trajectory import Trajectory, read_tum
+from bentwing.closing.global_registration import GlobalSettings
 from bentwing.map.read import read_points
 from bentwing.map.sample import MapSample
 from bentwing.recording import Clock, ImuBatch, LidarBatch, Payload
@@ -195,3 +196,13 @@ def test_settings_are_written_once_and_read_back_the_same(recording):
 def test_settings_that_cannot_be_are_refused_by_name(wrong, named):
     with pytest.raises(UsageError, match=named):
         run_settings(**wrong)
+
+
+def test_the_settings_of_the_closing_are_those_that_are_used(tmp_path, recording):
+    closing = GlobalSettings(memory_mb=100.0)
+    pipeline.run_recording(
+        recording, tmp_path / "out", run_settings(payload=PAYLOAD, loop_closure=closing)
+    )
+    record = record_of(tmp_path / "out")
+    assert record["settings"]["loop_closure"]["memory_mb"] == 100.0
+    assert record["loop_closure"]["budget"]["megabytes"] <= 100.0

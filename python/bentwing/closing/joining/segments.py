@@ -30,6 +30,7 @@ def close_segments(
     batches: Iterable[Batch],
     payload: Payload,
     *,
+    settings: GlobalSettings | None = None,
     budget: Budget | None = None,
     threads: int | None = None,
 ) -> tuple[Closed, dict[str, Any]]:
@@ -41,6 +42,7 @@ def close_segments(
     ----------
     estimate : with more than one segment
     batches : of the recording, as the estimator got them
+    settings : of the registration; default: its defaults
     budget : what may be held
 
     Returns
@@ -53,8 +55,17 @@ def close_segments(
     EstimationError
         If the segments' pose graph cannot be solved.
     """
-    budget = budget or Budget.of(length_of(estimate), GlobalSettings())
-    found = survey(NAME, estimate, batches, payload, surfel_rate=budget.rate, threads=threads)
+    settings = settings or GlobalSettings()
+    budget = budget or Budget.of(length_of(estimate), settings)
+    found = survey(
+        NAME,
+        estimate,
+        batches,
+        payload,
+        surfel_rate=budget.rate,
+        settings=settings,
+        threads=threads,
+    )
     parts = parts_of([found])
     trajectories = {
         Part(0, s): stretches.trajectory for s, stretches in enumerate(found.recorded.segments)
@@ -72,7 +83,7 @@ def close_segments(
         breaks=_judged(estimate.breaks, together, matches),
     )
     recorded = replace(found.recorded, estimate=moved, segments=segments)
-    result = register_jointly([recorded], budget=budget, threads=threads)
+    result = register_jointly([recorded], settings=settings, budget=budget, threads=threads)
     (closed,), warnings = result.estimates, list[str]()
     if result.failure is not None:
         sentence = f"the segments were not registered with each other: {result.failure}"

@@ -45,6 +45,7 @@ def survey(
     payload: Payload,
     *,
     surfel_rate: float,
+    settings: GlobalSettings | None = None,
     threads: int | None = None,
 ) -> Survey:
     """Go through a recording once.
@@ -52,8 +53,9 @@ def survey(
     Parameters
     ----------
     surfel_rate : most surfels per second
+    settings : of the registration that follows; default: its defaults
     """
-    settings = GlobalSettings()
+    settings = settings or GlobalSettings()
     collector = Collector(
         estimate,
         length=settings.stretch,

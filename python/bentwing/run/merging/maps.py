@@ -162,7 +162,9 @@ def _one_map(
     notes, closing = _warnings(group, found), None
     if len(sources) > 1:
         with folder.stage("register"), found.progress.stage("register"):
-            result = register_jointly(recorded, threads=found.settings.threads)
+            result = register_jointly(
+                recorded, settings=found.settings.loop_closure, threads=found.settings.threads
+            )
         estimates, closing = result.estimates, result.record
         if result.failure is not None:
             notes.append(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from bentwing.base.errors import UsageError
 from bentwing.base.progress import Progress
-from bentwing.closing.global_registration import Budget, GlobalSettings
+from bentwing.closing.global_registration import Budget
 from bentwing.closing.global_registration.stretches import length_of
 from bentwing.closing.joining.describe import describe_matches, describe_parts_of
 from bentwing.closing.joining.matches import Part, find_matches, parts_of
@@ -134,7 +134,7 @@ def _surveyed(
     sources: Sequence[Source], settings: MergeSettings, progress: Progress
 ) -> list[Survey]:
     seconds = sum(length_of(source.estimate) for source in sources)
-    budget = Budget.of(seconds, GlobalSettings())
+    budget = Budget.of(seconds, settings.loop_closure)
     progress.note(f"merging: {budget.sentence()}")
     surveys = []
     for source in sources:
@@ -146,6 +146,7 @@ def _surveyed(
                     part.batches(shown, Counter()),
                     source.payload,
                     surfel_rate=budget.rate,
+                    settings=settings.loop_closure,
                     threads=settings.threads,
                 )
             )

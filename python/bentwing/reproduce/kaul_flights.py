@@ -19,7 +19,8 @@ from bentwing.map.project import project
 from bentwing.map.writer import open_map
 from bentwing.recording import Payload, Recording
 from bentwing.recording.preprocess import RecordingPart
-from bentwing.run.pipeline import finish_recording
+from bentwing.run.pipeline import run_recording
+from bentwing.run.run import Run
 from bentwing.run.settings import as_run_settings
 from bentwing.simulate.instruments import TerrestrialErrors, choose_stations, scan, track
 from bentwing.simulate.ros import EPOCH_NS
@@ -32,7 +33,6 @@ if TYPE_CHECKING:
 
     from bentwing.reproduce.figure import Assignment
     from bentwing.run.found import Found
-    from bentwing.run.run import Run
     from bentwing.simulate.scenario import SceneName
     from bentwing.simulate.setup import Setup
     from bentwing.simulate.write import SimulatedRecording
@@ -120,11 +120,11 @@ def fly_and_map(plan: FlightPlan, assignment: Assignment) -> Flown:
         files = write_recording(setup, scenario, folder, advance)
     out = folder / "run"
     settings = as_run_settings(estimator="continuous", payload=files.payload, settings=None)
-    run, found = finish_recording(
+    found = run_recording(
         files.recording, out, settings, files.payload, progress=assignment.progress
     )
     record = json.loads((out / "run.json").read_text(encoding="utf-8"))
-    return Flown(plan, setup, files, out, run, found, record)
+    return Flown(plan, setup, files, out, Run.of(out, found), found, record)
 
 
 def truth_of(flown: Flown) -> tuple[Trajectory, int]:

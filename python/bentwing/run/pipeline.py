@@ -92,7 +92,8 @@ def map_recording(
         duration=duration,
     )
     described = payload if isinstance(payload, (str, Path)) else None
-    return run_recording(paths, out, chosen, described, resume=resume, progress=progress)
+    found = run_recording(paths, out, chosen, described, resume=resume, progress=progress)
+    return Run.of(Path(out), found)
 
 
 def run_recording(
@@ -103,26 +104,20 @@ def run_recording(
     *,
     resume: bool = False,
     progress: Progress | None = None,
-) -> Run:
+) -> Found:
     """Map a recording as its settings say; see `map_recording`.
 
     Parameters
     ----------
     payload_file : that `settings.payload` was read from; it counts as an input
+
+    Returns
+    -------
+    What the stages have found; `Run.of` makes a run of it.
     """
-    return finish_recording(paths, out, settings, payload_file, resume=resume, progress=progress)[0]
-
-
-def finish_recording(
-    paths: Path | str | Sequence[Path | str],
-    out: Path | str,
-    settings: RunSettings,
-    payload_file: Path | str | None = None,
-    *,
-    resume: bool = False,
-    progress: Progress | None = None,
-) -> tuple[Run, Found]:
-    """Return the run, and what its stages have found: a sample of the map, the spin of the head."""
+    engine = odometry.create(
+        settings.estimator, settings.payload, settings.of_estimator, settings.threads
+    )
     with (
         Recording(paths, settings.payload) as recording,
         RunFolder(Path(out), settings.to_json()) as folder,
@@ -134,10 +129,7 @@ def finish_recording(
             checkpoint = Checkpoint(folder)
             done, found = checkpoint.restore(resume=resume)
             if done is None:
-                engine = odometry.create(
-                    settings.estimator, settings.payload, settings.of_estimator, settings.threads
-                )
-                found = _keep(job, stages.estimate(job, engine), found.notes, open_loop=True)
+                found = _keep(job, stages.estimate(job, found, engine), open_loop=True)
                 checkpoint.save("estimate", found)
             if settings.closes_loops and done != "loops":
                 found = _keep(job, stages.close(job, found))
@@ -146,7 +138,7 @@ def finish_recording(
             found = _keep(job, stages.make_map(job, found))
             report_run(folder, found)
             checkpoint.discard()
-    return Run.of(folder.path, found), found
+    return found
 
 
 def _open_inputs(job: stages.Job, payload_file: Path | str | None) -> PriorMap | None:
@@ -162,11 +154,8 @@ def _open_inputs(job: stages.Job, payload_file: Path | str | None) -> PriorMap |
     return known
 
 
-def _keep(
-    job: stages.Job, found: Found, notes: Sequence[str] = (), *, open_loop: bool = False
-) -> Found:
+def _keep(job: stages.Job, found: Found, *, open_loop: bool = False) -> Found:
     """Write the trajectory and record what was found; raise if the stage did not finish."""
-    found = replace(found, notes=(*notes, *found.notes))
     before, job.folder.record.found = job.folder.record.found, found
     if found.estimate is not None and open_loop:
         job.folder.write_trajectory("odometry.txt", found.estimate, job.origin_ns)

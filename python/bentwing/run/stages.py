@@ -54,24 +54,24 @@ class Job:
         return self.part.recording.clock.start_ns
 
 
-def estimate(job: Job, engine: Estimator) -> Found:
+def estimate(job: Job, found: Found, engine: Estimator) -> Found:
     """Find the open-loop trajectory and the calibration; with a failure, as far as they go."""
     part, counts, spin = job.part, Counter[str](), Spin()
     failure: BaseException | None = None
-    found: Estimate | None = None
+    open_loop: Estimate | None = None
     with job.folder.stage("estimate"), job.progress.stage("estimate", part.length) as shown:
         try:
             for batch in part.batches(shown, counts):
                 engine.feed(batch)
                 spin.watch(batch)
-            found = engine.result()
+            open_loop = engine.result()
         except BaseException as error:
             failure = error
             if isinstance(error, (EstimationError, KeyboardInterrupt)):
                 with suppress(EstimationError):  # there may be nothing yet
-                    found = engine.so_far()
+                    open_loop = engine.so_far()
     reading = Reading(dict(part.recording.counts + counts), list(part.recording.warnings))
-    return Found(found, reading, spin, failure=failure)
+    return replace(found, estimate=open_loop, reading=reading, spin=spin, failure=failure)
 
 
 def close(job: Job, found: Found) -> Found:

@@ -65,7 +65,7 @@ def test_what_cannot_be_bridged_is_cut_in_two(flight, mapped):
 
 def test_live_poses_behind_a_break_are_those_of_the_estimate(flight, mapped):
     estimate = mapped(8.0, 15.0, LidarBatch, ImuBatch)
-    newest = flight.engine.current
+    newest = flight.engine.current.registered
     recent = Prediction(newest).recent
     within = slice(2, -1)  # the first sample is interpolated over the break
     positions, quats = estimate.trajectory.interpolate(recent.times[within])

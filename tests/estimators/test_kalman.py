@@ -25,15 +25,16 @@ from bentwing.base.errors import (
 from bentwing.base.trajectory import read_tum
 from bentwing.evaluate.trajectory import absolute_error
 from bentwing.odometry.kalman import KalmanSettings
+from bentwing.odometry.kalman.beginning import Rest
 from bentwing.odometry.kalman.core import (
     BASE_ROTATION,
     ENCODER_DELAY,
     first_state,
     unlearned_delay,
 )
-from bentwing.odometry.kalman.filter_pass import Rest
 from bentwing.odometry.start import find_start
 from bentwing.recording import ImuBatch, LidarBatch, Payload, Recording
+from bentwing.recording.described import described_calibration
 from bentwing.recording.preprocess import preprocess
 from bentwing.simulate import Scenario, simulate
 
@@ -100,9 +101,9 @@ def test_a_rest_is_over_as_soon_as_the_inertial_samples_change():
 def test_a_delay_that_is_not_learned_turns_the_motor_the_other_way(turned):
     """Together with the turn of the mount it leaves the lidar where it is, at the rate of then."""
     engine, *_ = turned
-    mount = engine._mount
-    state = first_state(find_start(IMU_AT_REST, engine._imu), mount)
-    covariance = unlearned_delay(6.0, mount, state)
+    described = described_calibration(engine._payload)
+    state = first_state(find_start(IMU_AT_REST, engine._imu), described)
+    covariance = unlearned_delay(6.0, described.mount, state)
     std = np.sqrt(np.diag(covariance))
     assert std[ENCODER_DELAY] == pytest.approx([3e-3])
     assert std[BASE_ROTATION] == pytest.approx([0.0, 0.0, 6.0 * 3e-3])

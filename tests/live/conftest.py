@@ -16,6 +16,7 @@ from bentwing.odometry.continuous.settings import ContinuousSettings
 from bentwing.recording import EncoderBatch, ImuBatch, LidarBatch, Payload, Recording
 from bentwing.recording.payload import Encoder, Transform
 from bentwing.recording.preprocess import preprocess
+from bentwing.simulate import Scenario, simulate
 
 LENGTH = 12.0  # s; the rest at the start is over after four
 THINNING = 3  # every third point, for speed
@@ -98,6 +99,14 @@ def quick():
 def flight(simulated):
     """Twelve seconds of a flight."""
     return read_flight(simulated("office", 22.0))
+
+
+@pytest.fixture(scope="session")
+def turning(made_once):
+    """The first seconds of a flight with a 3D lidar that turns once a second."""
+    scenario = Scenario(scene="office", head="vlp16-motor", motor_rate=6.2832, duration=22.0)
+    folder = made_once("live-turning", lambda out: simulate(scenario, out))
+    return read_flight(folder, length=9.0, thinning=1)
 
 
 @pytest.fixture(scope="session")

@@ -252,7 +252,7 @@ def test_a_failure_is_told_to_who_feeds_and_to_who_reads(new, flight, monkeypatc
         msg = "moved by 1000 m"
         raise DivergedError(msg)
 
-    monkeypatch.setattr(Continuous, "step", diverge)
+    monkeypatch.setattr(Continuous, "advance", diverge)
     odometry.feed(flight.pieces[len(until(flight.pieces, 8.0))])
     with pytest.raises(DivergedError, match="1000 m"):
         odometry.wait()

@@ -8,23 +8,13 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from bentwing import Odometry, UsageError
+from bentwing import Odometry
 from bentwing.odometry import Kalman
 from bentwing.odometry.kalman import KalmanSettings
 from bentwing.recording import ImuBatch
 from bentwing.recording.preprocess import preprocess
-from bentwing.simulate import Scenario, simulate
 
 SETTINGS = KalmanSettings(rehearsal=4.0)
-LENGTH = 9.0
-
-
-@pytest.fixture(scope="module")
-def turning(made_once, read_flight):
-    """The first seconds of a flight with a lidar that turns once a second."""
-    scenario = Scenario(scene="office", head="vlp16-motor", motor_rate=6.2832, duration=22.0)
-    folder = made_once("kalman-turning", lambda out: simulate(scenario, out))
-    return read_flight(folder, LENGTH, 1)
 
 
 @pytest.fixture(scope="module")
@@ -71,11 +61,6 @@ def test_the_map_has_points_of_the_room(flown):
     _, cloud, _ = flown
     assert len(cloud) > 5000
     assert np.abs(cloud).max() < 30.0
-
-
-def test_an_estimator_that_cannot_be_used_live_is_refused(turning):
-    with pytest.raises(UsageError, match=r"ndt.*continuous or kalman"):
-        Odometry(turning.payload, estimator="ndt")
 
 
 def test_rings_of_another_shape_are_refused(turning):

@@ -9,7 +9,7 @@ import numpy as np
 
 from bentwing.base import geometry
 from bentwing.base.breaks import HEAD, Break
-from bentwing.base.trajectory import Trajectory
+from bentwing.base.trajectory import DT, Trajectory
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -73,7 +73,19 @@ def heading(quat: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.array([0.0, 0.0, 0.0, 1.0]) if length < 1e-9 else twist / length
 
 
-def joined(segments: Sequence[Trajectory], dt: float) -> Trajectory:
+def turned(
+    trajectory: Trajectory, turn: NDArray[np.float64], about: NDArray[np.float64] | None = None
+) -> Trajectory:
+    """Return a trajectory in the frame that a rotation (4,) leads to, `about` (3,) as its origin."""
+    positions = trajectory.positions if about is None else trajectory.positions - about
+    return Trajectory(
+        trajectory.times,
+        geometry.rotate(turn, positions),
+        geometry.multiply(turn, trajectory.quats_xyzw),
+    )
+
+
+def joined(segments: Sequence[Trajectory], dt: float = DT) -> Trajectory:
     """One trajectory at a uniform rate, with straight motion over the breaks."""
     if len(segments) == 1:
         return segments[0]

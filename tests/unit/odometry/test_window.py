@@ -77,6 +77,16 @@ def test_a_disturbed_trajectory_comes_back():
     assert result.calibration.std == {}
 
 
+def test_points_that_are_stamped_late_are_taken_back_by_the_latency_of_the_payload():
+    points, times = seen(truth())
+    late = PAYLOAD.model_copy(update={"lidar": PAYLOAD.lidar.model_copy(update={"latency": 0.05})})
+    prior = disturbed(truth())
+    in_time = register_window(points, times, prior, payload=PAYLOAD, settings=SETTINGS)
+    result = register_window(points, times + 0.05, prior, payload=late, settings=SETTINGS)
+    assert result.calibration.latency == 0.05
+    assert np.abs(result.trajectory.positions - in_time.trajectory.positions).max() < 1e-3
+
+
 def test_an_earlier_window_holds_a_later_one():
     points, times = seen(truth())
     early, late = times < 1.5, times >= 1.5

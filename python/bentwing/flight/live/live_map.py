@@ -14,8 +14,8 @@ from bentwing.map.thin import VoxelSet, voxel_keys
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from bentwing.flight.live.engine import Done
     from bentwing.odometry.buffer import BatchBuffer
+    from bentwing.odometry.interface import Registered
 
 # More points than this from one window add nothing to a map of one point per voxel.
 POINTS_PER_WINDOW = 200_000
@@ -57,9 +57,10 @@ class LiveMap:
         self._n_given = 0  # parts
         self._given_anything = False
 
-    def add(self, registered: Done, buffer: BatchBuffer) -> None:
+    def add(self, registered: Registered, buffer: BatchBuffer) -> None:
         """Place what a window has newly registered."""
-        stretch = buffer.lidar(self._until, registered.end)
+        first = registered.samples.start + registered.globals.latency
+        stretch = buffer.lidar(max(self._until, first), registered.end)
         self._until = registered.end
         chosen = slice(None, None, -(-len(stretch.times) // POINTS_PER_WINDOW) or None)
         angles = stretch.angles

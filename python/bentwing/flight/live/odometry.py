@@ -14,13 +14,13 @@ import numpy as np
 from bentwing.base.errors import UsageError
 from bentwing.flight.control import StallWatch
 from bentwing.flight.live.backlog import Backlog
-from bentwing.flight.live.engine import create_engine, estimate_at, new_data
 from bentwing.flight.live.inputs import InputOrder
 from bentwing.flight.live.live_map import LiveMap, MapUpdate
 from bentwing.flight.live.prediction import StampedPose, past_pose
-from bentwing.flight.live.state import LiveState, Registered
+from bentwing.flight.live.state import LiveState, Published
 from bentwing.flight.live.status import Status, status_of
 from bentwing.flight.live.worker import Worker
+from bentwing.odometry import create
 from bentwing.recording import EncoderBatch, ImuBatch, LidarBatch, Payload
 from bentwing.recording.preprocess import Preprocessing
 
@@ -28,14 +28,13 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from numpy.typing import ArrayLike, NDArray
+    from pydantic import BaseModel
     from typing_extensions import Self
 
     from bentwing.base.estimate import Estimate
     from bentwing.base.trajectory import Trajectory
     from bentwing.base.window_record import WindowRecord
     from bentwing.flight.control import Stall
-    from bentwing.odometry.continuous.settings import ContinuousSettings
-    from bentwing.odometry.kalman import KalmanSettings
     from bentwing.recording import Batch
 
 
@@ -50,7 +49,8 @@ class Odometry:
     Parameters
     ----------
     payload : the sensor head, or the payload.yaml that describes it
-    estimator : `continuous`, or `kalman`: a 3D lidar and an IMU, the pose corrected ten times a second
+    estimator : `continuous`; or for a 3D lidar, with the pose corrected ten times a second, `kalman`
+        with an IMU, or `ndt`, which needs none
     settings : of the estimator; default: as `map_recording`
     threads : for one registration; default: all cores
     map_spacing : m, edge of the voxels that keep one point of the map each
@@ -64,7 +64,7 @@ class Odometry:
         payload: Payload | Path | str,
         *,
         estimator: str = "continuous",
-        settings: ContinuousSettings | KalmanSettings | None = None,
+        settings: BaseModel | None = None,
         threads: int | None = None,
         map_spacing: float = 0.1,
         max_map_points: int = 5_000_000,
@@ -86,10 +86,10 @@ class Odometry:
         self._order = InputOrder()
         self._feeding = Lock()
         self._state = LiveState()
-        self._engine = create_engine(estimator, head, settings, threads)
-        self._shift = new_data(self._engine)
+        self._engine = create(estimator, head, settings, threads)
+        self._shift = self._engine.step_length
         self._final: Estimate | None = None
-        self._cached: tuple[Registered, Estimate] | None = None
+        self._cached: tuple[Published, Estimate] | None = None
         self._newest_point = -np.inf
         self._worker = Worker(
             self._engine,
@@ -210,9 +210,9 @@ class Odometry:
         """
         if self._final is not None:
             return self._final
-        registered, cached = self._state.require(), self._cached
-        if cached is None or cached[0] is not registered:
-            cached = registered, estimate_at(self._engine, registered.done)
+        newest, cached = self._state.require(), self._cached
+        if cached is None or cached[0] is not newest:
+            cached = newest, newest.snapshot.estimate()
             self._cached = cached
         return cached[1]
 
@@ -267,13 +267,13 @@ class Odometry:
     def surfel_normals(self) -> NDArray[np.float64]:
         """Return the normals (N, 3), map frame, of what the last window has seen, for `SpinTarget`."""
         newest = self._state.newest
-        return np.empty((0, 3)) if newest is None else newest.done.normals()
+        return np.empty((0, 3)) if newest is None else newest.registered.normals()
 
     @property
     def health(self) -> WindowRecord | None:
         """The record of the last window, as in `Estimate.windows`; None while waiting."""
         newest = self._state.newest
-        return None if newest is None else newest.done.windows[-1]
+        return None if newest is None else newest.registered.windows[-1]
 
     @property
     def counts(self) -> dict[str, int]:
@@ -339,4 +339,4 @@ class Odometry:
     def _has_time(self, batch: LidarBatch) -> bool:
         self._worker.require_health()
         newest, end = self._state.newest, float(batch.times[-1])
-        return newest is None or self._backlog.has_time(end, newest.done.end, self._shift)
+        return newest is None or self._backlog.has_time(end, newest.registered.end, self._shift)

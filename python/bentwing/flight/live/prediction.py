@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bentwing.base.trajectory import Trajectory
-    from bentwing.flight.live.engine import Done
     from bentwing.flight.live.imu_tail import ImuTail
+    from bentwing.odometry.interface import Registered
 
 # Beyond the newest data the last measured rate and force are held for at most this long, s.
 MAX_EXTRAPOLATION = 0.1
@@ -60,7 +60,7 @@ class Prediction:
     Not for several threads at once.
     """
 
-    def __init__(self, registered: Done) -> None:
+    def __init__(self, registered: Registered) -> None:
         self.recent = registered.recent()
         self.registered_until = registered.end - registered.globals.latency
         self._slow = registered.globals.levelled()

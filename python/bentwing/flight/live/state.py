@@ -12,9 +12,9 @@ from bentwing.flight.live.imu_tail import ImuTail
 from bentwing.flight.live.prediction import MAX_EXTRAPOLATION, OVERLAP, Prediction
 
 if TYPE_CHECKING:
-    from bentwing.flight.live.engine import Done
     from bentwing.flight.live.live_map import LiveMap
     from bentwing.flight.live.prediction import StampedPose
+    from bentwing.odometry.interface import Registered, Snapshot
     from bentwing.recording.batches import ImuBatch
 
 # While a start is waited for, only this much of the rest is kept, s.
@@ -22,21 +22,26 @@ REST = 60.0
 
 
 @dataclass(frozen=True, slots=True)
-class Registered:
+class Published:
     """What the newest window has left behind.
 
     Attributes
     ----------
-    done : the pass as it was then
+    snapshot : what the estimator knew then
     cloud : the map of its pass
     """
 
-    done: Done
+    snapshot: Snapshot
     cloud: LiveMap
     prediction: Prediction = field(init=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "prediction", Prediction(self.done))
+        object.__setattr__(self, "prediction", Prediction(self.registered))
+
+    @property
+    def registered(self) -> Registered:
+        """What the pass had registered then."""
+        return self.snapshot.registered
 
 
 class LiveState:
@@ -45,10 +50,10 @@ class LiveState:
     def __init__(self) -> None:
         self._lock = Lock()
         self._imu = ImuTail()
-        self._newest: Registered | None = None
+        self._newest: Published | None = None
 
     @property
-    def newest(self) -> Registered | None:
+    def newest(self) -> Published | None:
         """The newest registered window."""
         return self._newest
 
@@ -64,14 +69,14 @@ class LiveState:
             if self._newest is None:
                 self._imu.forget(self._imu.end - REST - 1.0)
 
-    def publish(self, registered: Registered) -> None:
+    def publish(self, newer: Published) -> None:
         """Go on from a newer window from now on; an older one, as behind a break, is passed over."""
         with self._lock:
             before = self._newest
-            if before is not None and registered.done.end < before.done.end:
+            if before is not None and newer.registered.end < before.registered.end:
                 return
-            self._newest = registered
-            self._imu.forget(float(registered.prediction.recent.times[-1]) - 2 * OVERLAP)
+            self._newest = newer
+            self._imu.forget(float(newer.prediction.recent.times[-1]) - 2 * OVERLAP)
 
     def pose(self, at: float | None, newest_point: float) -> StampedPose | None:
         """Return the pose at a time or, without one, at the newest data; None before `recent`.
@@ -97,12 +102,12 @@ class LiveState:
         """Return how much newer than the last window the newest data is, s; 0 without a window."""
         with self._lock:
             newest = self._newest
-            return 0.0 if newest is None else self._data_end(newest_point) - newest.done.end
+            return 0.0 if newest is None else self._data_end(newest_point) - newest.registered.end
 
     def _data_end(self, newest_point: float) -> float:
         return self._imu.end if len(self._imu) else newest_point
 
-    def require(self) -> Registered:
+    def require(self) -> Published:
         """Return the newest registered window.
 
         Raises

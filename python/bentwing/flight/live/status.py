@@ -6,7 +6,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
-    from bentwing.flight.live.state import Registered
+    from bentwing.flight.live.state import Published
 
 Status = Literal["waiting", "initializing", "tracking", "degenerate", "coasting", "failed"]
 
@@ -14,7 +14,7 @@ Status = Literal["waiting", "initializing", "tracking", "degenerate", "coasting"
 COASTING = 0.5
 
 
-def status_of(newest: Registered | None, age: float, shift: float) -> Status:
+def status_of(newest: Published | None, age: float, shift: float) -> Status:
     """Return the status of an estimate that has not failed.
 
     Parameters
@@ -27,6 +27,6 @@ def status_of(newest: Registered | None, age: float, shift: float) -> Status:
         return "waiting"
     if age > 2 * shift + COASTING:
         return "coasting"
-    if newest.done.is_settling:
+    if newest.registered.is_settling:
         return "initializing"
-    return "degenerate" if newest.done.windows[-1].degenerate else "tracking"
+    return "degenerate" if newest.registered.windows[-1].degenerate else "tracking"

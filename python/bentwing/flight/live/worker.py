@@ -8,14 +8,14 @@ from threading import Condition, Thread, current_thread
 from typing import TYPE_CHECKING
 
 from bentwing.base.errors import UsageError
-from bentwing.flight.live.state import REST, Registered
+from bentwing.flight.live.state import REST, Published
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from bentwing.flight.live.engine import Done, Engine, Pass
     from bentwing.flight.live.live_map import LiveMap
     from bentwing.flight.live.state import LiveState
+    from bentwing.odometry.interface import Estimator
     from bentwing.recording.batches import Batch
     from bentwing.recording.preprocess import Preprocessing
 
@@ -35,7 +35,7 @@ class Worker:
 
     def __init__(
         self,
-        engine: Engine,
+        engine: Estimator,
         preprocessing: Preprocessing,
         state: LiveState,
         new_map: Callable[[], LiveMap],
@@ -44,7 +44,9 @@ class Worker:
         self._preprocessing = preprocessing
         self._state = state
         self._new_map = new_map
-        self._mapped: Pass | None = None
+        # The pass that is mapped, by its number; of none there is nothing to publish yet.
+        self._mapped = 0
+        self._is_waiting = True
         self._cloud = new_map()
         self._searched = -float("inf")
         self._queue: deque[Batch] = deque()
@@ -134,10 +136,10 @@ class Worker:
                 self._engine.take(usable)
 
     def _register(self, *, finishing: bool = False) -> None:
-        if not finishing and self._engine.current is None and not self._search():
+        if not finishing and self._is_waiting and not self._search():
             return
-        while not self._stopping and (done := self._engine.step(finishing=finishing)) is not None:
-            self._publish(done)
+        while not self._stopping and self._engine.advance(finishing=finishing):
+            self._publish()
             with self._changed:
                 batches = self._taken()
             self._take(batches)
@@ -151,8 +153,12 @@ class Worker:
         self._engine.buffer.forget(span[1] - REST)
         return True
 
-    def _publish(self, done: Done) -> None:
-        if self._mapped is not self._engine.current:
-            self._mapped, self._cloud = self._engine.current, self._new_map()
-        self._cloud.add(done, self._engine.buffer)
-        self._state.publish(Registered(done.snapshot(), self._cloud))
+    def _publish(self) -> None:
+        now = self._engine.current
+        self._is_waiting = now is None
+        if now is None:
+            return
+        if self._mapped != now.n_passes:
+            self._mapped, self._cloud = now.n_passes, self._new_map()
+        self._cloud.add(now.registered, self._engine.buffer)
+        self._state.publish(Published(now, self._cloud))

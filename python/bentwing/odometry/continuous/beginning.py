@@ -4,23 +4,22 @@
 from __future__ import annotations
 
 from copy import deepcopy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bentwing import _core
 from bentwing.base import geometry
-from bentwing.base.calibration import STANDARD_GRAVITY, Calibration
 from bentwing.base.trajectory import DT
 from bentwing.odometry.continuous.odometry_pass import OdometryPass
 from bentwing.odometry.continuous.slow_states import SlowStatePrior, initial_std
 from bentwing.odometry.core_states import core_globals
 from bentwing.odometry.segments import extrapolated, heading
 from bentwing.odometry.start import attitude_of
+from bentwing.recording.described import described_calibration
 
 if TYPE_CHECKING:
-    from bentwing.base.mount import Mount
     from bentwing.odometry.continuous.core_settings import CoreSettings
     from bentwing.odometry.continuous.settings import ContinuousSettings
     from bentwing.odometry.start import Start
@@ -32,7 +31,6 @@ class Situation:
     """What the passes over a recording have in common."""
 
     payload: Payload
-    mount: Mount
     settings: ContinuousSettings
     core: CoreSettings
     threads: int
@@ -76,15 +74,8 @@ def begin_pass(
 
 
 def _described(situation: Situation, start: Start) -> _core.Globals:
-    return core_globals(
-        Calibration(
-            latency=situation.payload.lidar.latency,
-            mount=situation.mount,
-            gyro_bias=start.gyro_bias,
-            accel_bias=start.accel_bias,
-            gravity=np.array([0.0, 0.0, STANDARD_GRAVITY]),
-        )
-    )
+    described = described_calibration(situation.payload)
+    return core_globals(replace(described, gyro_bias=start.gyro_bias, accel_bias=start.accel_bias))
 
 
 def _prior(situation: Situation, start: Start, before: OdometryPass | None) -> SlowStatePrior:

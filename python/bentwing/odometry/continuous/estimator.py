@@ -4,27 +4,32 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 from bentwing.base.breaks import HEAD, Break
 from bentwing.base.errors import NotEnoughDataError
 from bentwing.base.trajectory import DT
-from bentwing.odometry.buffer import BatchBuffer
 from bentwing.odometry.continuous.beginning import Situation, begin_pass
 from bentwing.odometry.continuous.core_settings import CoreSettings
-from bentwing.odometry.continuous.odometry_pass import MARGIN, OdometryPass
+from bentwing.odometry.continuous.odometry_pass import MARGIN
 from bentwing.odometry.continuous.outcome import estimate_of
-from bentwing.odometry.continuous.planar import is_plane
+from bentwing.odometry.continuous.phases import Bridging, Running, Stalled, Waiting
 from bentwing.odometry.continuous.settings import ContinuousSettings
 from bentwing.odometry.continuous.standstill import SpinWatch
+from bentwing.odometry.interface import Estimator, Snapshot
+from bentwing.odometry.planar import is_plane
 from bentwing.odometry.segments import JUDGED, MAX_IMU_GAP, found_again
 from bentwing.odometry.stall import LOST_AFTER
-from bentwing.odometry.start import Start, find_start, level_start
+from bentwing.odometry.start import find_start, level_start
 from bentwing.recording import LidarBatch
 from bentwing.recording.described import described_mount
 
 if TYPE_CHECKING:
     from bentwing.base.estimate import Estimate
+    from bentwing.odometry.continuous.odometry_pass import OdometryPass
+    from bentwing.odometry.continuous.phases import Begun, Phase
+    from bentwing.odometry.start import Start
     from bentwing.recording import Batch, Payload
 
 # A rest shorter than this is waited out before the start is judged, s.
@@ -34,7 +39,7 @@ LOOK_AHEAD = 6.0
 CAREFUL_STEPS = 3
 
 
-class Continuous:
+class Continuous(Estimator):
     """Continuous-time surfel odometry; feed batches in time order, then ask for the result.
 
     Latency, extrinsics and accelerometer bias cannot be known before the payload has turned. What was
@@ -47,50 +52,51 @@ class Continuous:
         settings: ContinuousSettings | None = None,
         threads: int | None = None,
     ) -> None:
-        self.settings = settings or ContinuousSettings()
+        super().__init__()
+        self.settings: ContinuousSettings = settings or ContinuousSettings()
         self._payload = payload
         self._mount = described_mount(payload)
         self._threads = threads or 0
-        self._sliding = self.settings
-        self._core = CoreSettings.of(self.settings.registration, payload, DT)
-        self._buffer = BatchBuffer()
-        self._start: Start | None = None
-        self._first = 0.0
-        self._pass: OdometryPass | None = None
+        self._phase: Phase = Waiting()
         # What came before the last break.
         self._before: list[OdometryPass] = []
-        # The pass as it was at a break, while it is not known whether it can be continued.
-        self._bridged: tuple[OdometryPass, Break] | None = None
-        # Whether the lidar is a 2D one, which sees single planes when its head stands still; the pass as
-        # it was when the head came to stand, and since when it stands.
+        self._breaks: list[Break] = []
+        # Whether the lidar is a 2D one, which sees single planes when its head stands still.
         self._is_planar = True
         self._spin = SpinWatch(by_encoder=payload.encoder is not None)
-        self._stalled: tuple[OdometryPass, float] | None = None
-        self._breaks: list[Break] = []
-
-    def feed(self, batch: Batch) -> None:
-        """Take the next batch; windows that have become complete are registered."""
-        self.take(batch)
-        self._advance(finishing=False)
 
     def take(self, batch: Batch) -> None:
-        """Hold the next batch for `step`."""
-        self._buffer.add(batch)
+        """Hold the next batch for `advance`."""
+        super().take(batch)
         if not len(batch.times):
             return
         if self._is_planar and isinstance(batch, LidarBatch) and len(batch.times) >= 3:
             self._is_planar = is_plane(batch.points)
         self._spin.add(batch)
 
-    def step(self, *, finishing: bool = False) -> OdometryPass | None:
-        """Register one window that has become complete; returns its pass, None without any.
+    @property
+    def step_length(self) -> float:
+        """How much new lidar data a step takes at most, s."""
+        return self.settings.shift
 
-        The result is that of `feed`; `finishing` as `result` does.
-        """
-        while self._go_on(finishing=finishing):
-            if self._pass is not None:
-                return self._pass
-        return None
+    def advance(self, *, finishing: bool = False) -> bool:
+        """Begin, register a window, or pass a break; returns whether one of them was possible."""
+        ready = self._ready_until(finishing=finishing)
+        if ready is None:
+            return False
+        if isinstance(self._phase, Waiting):
+            return self._begin(ready, finishing=finishing)
+        return self._step(self._phase, ready, finishing=finishing)
+
+    @property
+    def current(self) -> Snapshot | None:
+        """What the pass under way knows now; None until it has registered a window."""
+        phase = self._phase
+        if isinstance(phase, Waiting) or not phase.under_way.windows:
+            return None
+        now = phase.under_way.snapshot()
+        passes = [*self._before, now]
+        return Snapshot(now, len(passes), partial(self._estimate, passes, [*self._breaks]))
 
     def result(self) -> Estimate:
         """Finish with what was fed so far.
@@ -100,9 +106,8 @@ class Continuous:
         NotEnoughDataError
             There is no second of lidar data.
         """
-        self._advance(finishing=True)
-        found = self.so_far()
-        lidar, imu = self._buffer.lidar_span, self._buffer.imu_span
+        found = super().result()
+        lidar, imu = self.buffer.lidar_span, self.buffer.imu_span
         if lidar is None or imu is None or lidar[1] <= imu[1] + MAX_IMU_GAP:
             return found
         left_out = Break("inertial", imu[1], lidar[1], "left out")
@@ -116,40 +121,22 @@ class Continuous:
         NotEnoughDataError
             There is none yet.
         """
-        done = self._pass
-        if done is None or not done.windows or done.end - self._first < self._sliding.shift:
-            if not self._before:
-                msg = (
-                    f"less than {self._sliding.shift:g} s of lidar points; nothing can be estimated"
-                )
-                raise NotEnoughDataError(msg)
-            return estimate_of(self._before, self._mount, self._breaks)
-        return self.estimate(done)
+        passes, shift = [*self._before], self.settings.shift
+        if not isinstance(self._phase, Waiting):
+            now, shift = self._phase.under_way, self._phase.under_way.settings.shift
+            if now.windows and now.length >= shift:
+                passes.append(now)
+        if not passes:
+            msg = f"less than {shift:g} s of lidar points; nothing can be estimated"
+            raise NotEnoughDataError(msg)
+        return self._estimate(passes, self._breaks)
 
-    @property
-    def current(self) -> OdometryPass | None:
-        """The pass that is under way."""
-        return self._pass
-
-    @property
-    def buffer(self) -> BatchBuffer:
-        """What coming windows may need of the batches."""
-        return self._buffer
-
-    def _advance(self, *, finishing: bool) -> None:
-        while self._go_on(finishing=finishing):
-            pass
-
-    def _go_on(self, *, finishing: bool) -> bool:
-        """Do what can be done next: begin, register a window, pass a break; returns whether so."""
-        ready = self._ready_until(finishing=finishing)
-        if ready is None or (self._start is None and not self._begin(ready, finishing=finishing)):
-            return False
-        return self._step(ready, finishing=finishing)
+    def _estimate(self, passes: list[OdometryPass], breaks: list[Break]) -> Estimate:
+        return estimate_of(passes, self._mount, breaks)
 
     def _ready_until(self, *, finishing: bool) -> float | None:
         """Return the time up to which lidar and IMU data are complete, s."""
-        lidar, imu = self._buffer.lidar_span, self._buffer.imu_span
+        lidar, imu = self.buffer.lidar_span, self.buffer.imu_span
         if lidar is None:
             return None
         if imu is None:
@@ -158,126 +145,112 @@ class Continuous:
 
     def _begin(self, ready: float, *, finishing: bool) -> bool:
         """Find the start once enough has been seen; returns whether it was."""
-        lidar, imu = self._buffer.lidar_span, self._buffer.imu_span
+        lidar, imu = self.buffer.lidar_span, self.buffer.imu_span
         if lidar is None or (ready - lidar[0] < LOOK_AHEAD and not finishing):
             return False
-        self._first = lidar[0]
         if imu is None or self._payload.imu is None:
-            self._start = level_start(lidar[0])
-            self._sliding = self.settings.without_imu()
+            start, first, sliding = level_start(lidar[0]), lidar[0], self.settings.without_imu()
         else:
             # The trajectory begins with the later of both sensors.
-            self._first = max(lidar[0], imu[0] + 2 * DT)
-            begin = self._buffer.imu(imu[0], imu[1] + 1.0)
-            start = find_start(begin, self._payload.imu)
+            first, sliding = max(lidar[0], imu[0] + 2 * DT), self.settings
+            start = find_start(self.buffer.imu(imu[0], imu[1] + 1.0), self._payload.imu)
             still_resting = start.static is not None and start.hold >= imu[1] - 1.0
             if still_resting and not finishing:
                 return False
-            self._start = start
-        self._pass = self._new_pass(self._start)
+        self._phase = Running(self._new_pass(start, first, sliding))
         return True
 
-    def _new_pass(self, start: Start) -> OdometryPass:
-        begun = begin_pass(
-            Situation(
-                self._payload,
-                self._mount,
-                self._sliding,
-                self._core,
-                self._threads,
-                has_imu=self._buffer.has_imu,
-            ),
-            start,
-            self._first,
-            before=self._before[-1] if self._before else None,
+    def _new_pass(self, start: Start, first: float, sliding: ContinuousSettings) -> OdometryPass:
+        situation = Situation(
+            self._payload,
+            sliding,
+            CoreSettings.of(self.settings.registration, self._payload, DT),
+            self._threads,
+            has_imu=self.buffer.has_imu,
         )
+        begun = begin_pass(situation, start, first, self._before[-1] if self._before else None)
         if start.static is not None and self.settings.n_views:
-            begun.look_around(self._buffer)
+            begun.look_around(self.buffer)
         return begun
 
-    def _step(self, ready: float, *, finishing: bool) -> bool:
+    def _step(self, phase: Begun, ready: float, *, finishing: bool) -> bool:
         """Register the next window if its data is complete; returns whether it was."""
-        current, broken = self._pass, self._break_until(ready)
-        if current is None:
-            return False
-        if broken is not None:
+        now, broken = phase.under_way, self.buffer.first_break()
+        if broken is not None and broken.start <= ready:
             ready, finishing = broken.start, True
-        end = current.end + self._new_data
+        else:
+            broken = None
+        end = now.end + _new_data(phase)
         if end > ready:
             if not finishing:
                 return False
-            if ready - current.end < DT:
-                return self._judge_bridge() or self._bridge(current, broken)
+            if ready - now.end < DT:
+                return self._judge(phase) or self._bridge(now, broken)
             end = ready
-        self._watch_head(current, end)
-        current.step(self._buffer, end)
-        self._settle(end)
+        phase = self._watch_head(phase, end)
+        now.step(self.buffer, end)
+        self._settle(phase, end)
         return True
 
-    @property
-    def _new_data(self) -> float:
-        """How much of it the next window takes, s: little as long as the motion is a guess."""
-        settling = self._pass is not None and self._pass.is_settling
-        guessed = settling or self._bridged is not None
-        return self._sliding.shift / (CAREFUL_STEPS if guessed else 1)
-
-    def _settle(self, end: float) -> None:
+    def _settle(self, phase: Begun, end: float) -> None:
         """Judge a bridge when enough was seen behind it, and forget what no window needs."""
-        if self._bridged is not None and end >= self._bridged[1].stop + JUDGED[1]:
-            self._judge_bridge()
-        else:
-            needed = end if self._bridged is None else min(end, self._bridged[1].stop)
-            self._buffer.forget(needed - self._sliding.window - 1.0)
+        needed = end
+        if isinstance(phase, Bridging):
+            if end >= phase.broken.stop + JUDGED[1]:
+                self._judge(phase)
+                return
+            needed = min(end, phase.broken.stop)
+        self.buffer.forget(needed - phase.under_way.settings.window - 1.0)
 
-    def _break_until(self, ready: float) -> Break | None:
-        broken = self._buffer.first_break()
-        return broken if broken is not None and broken.start <= ready else None
-
-    def _bridge(self, current: OdometryPass, broken: Break | None) -> bool:
+    def _bridge(self, now: OdometryPass, broken: Break | None) -> bool:
         """Go on over a break as if it were none; returns whether there is one."""
         if broken is None:
             return False
-        self._bridged = current.snapshot(), broken
-        self._buffer.pass_over(broken)
+        self._phase = Bridging(now, now.snapshot(), broken)
+        self.buffer.pass_over(broken)
         return True
 
-    def _watch_head(self, current: OdometryPass, end: float) -> None:
+    def _watch_head(self, phase: Begun, end: float) -> Begun:
         """Remember the pass when the head comes to stand; after long, ask whether it found back.
 
         Parameters
         ----------
         end : s, of the next window; nothing later counts, so that live use and recordings agree
         """
-        if not self._is_planar or self._bridged is not None:
-            return
-        stalls = self._spin.stalls(end)
-        if not stalls:
-            return
-        start, stop = stalls[-1]
-        is_new = self._stalled is None or self._stalled[1] != start
-        if is_new and (stop is None or stop > current.end):
-            self._stalled = current.snapshot(), start
-        if stop is None or self._stalled is None:
-            return
-        before, self._stalled = self._stalled[0], None
-        if stop - start >= LOST_AFTER:
-            self._bridged = before, Break(HEAD, start, stop)
+        stalls = self._spin.stalls(end) if self._is_planar else []
+        if isinstance(phase, Bridging) or not stalls:
+            return phase
+        now, (start, stop) = phase.under_way, stalls[-1]
+        is_known = isinstance(phase, Stalled) and phase.since == start
+        if not is_known and (stop is None or stop > now.end):
+            phase = Stalled(now, now.snapshot(), start)
+        if isinstance(phase, Stalled) and stop is not None:
+            lasted = stop - start >= LOST_AFTER
+            phase = (
+                Bridging(now, phase.before, Break(HEAD, start, stop)) if lasted else Running(now)
+            )
+        self._phase = phase
+        return phase
 
-    def _judge_bridge(self) -> bool:
+    def _judge(self, phase: Begun) -> bool:
         """Begin anew after the last break if its far side does not fit; returns whether so."""
-        if self._bridged is None or self._pass is None:
+        if not isinstance(phase, Bridging):
             return False
-        (before, broken), self._bridged, self._stalled = self._bridged, None, None
-        found = found_again(self._pass.windows, broken)
-        self._breaks.append(replace(broken, outcome="bridged") if found else broken)
-        if found:
+        broken = phase.broken
+        if found_again(phase.under_way.windows, broken):
+            self._breaks.append(replace(broken, outcome="bridged"))
+            self._phase = Running(phase.under_way)
             return False
-        self._buffer.cut(broken.stop)
-        if before.windows:
-            self._before.append(before)
-        self._start = self._pass = None
+        self._breaks.append(broken)
+        self.buffer.cut(broken.stop)
+        if phase.before.windows:
+            self._before.append(phase.before)
+        self._phase = Waiting()
         return True
 
-    def estimate(self, last: OdometryPass) -> Estimate:
-        """Return what the passes before the last break and this one say, levelled."""
-        return estimate_of([*self._before, last], self._mount, self._breaks)
+
+def _new_data(phase: Begun) -> float:
+    """How much of it the next window takes, s: little as long as the motion is a guess."""
+    now = phase.under_way
+    guessed = now.is_settling or isinstance(phase, Bridging)
+    return now.settings.shift / (CAREFUL_STEPS if guessed else 1)

@@ -61,7 +61,7 @@ class OdometryPass:
         self.prior = prior
         self.windows: list[WindowRecord] = []
         self.n_blind = 0
-        self._settings = settings
+        self.settings = settings
         self._core = core
         self._threads = threads
         self._resting = resting
@@ -83,13 +83,18 @@ class OdometryPass:
         return self._end
 
     @property
+    def length(self) -> float:
+        """How much lidar data was used, s."""
+        return self._end - self._origin
+
+    @property
     def is_settling(self) -> bool:
         """Whether its windows have not yet reached their full length."""
-        return self._end - self._anchor < self._settings.window
+        return self._end - self._anchor < self.settings.window
 
     def look_around(self, buffer: BatchBuffer) -> None:
         """Freeze what was seen at rest; a 2D lidar sees no surfels then, a 3D lidar its first view."""
-        start = max(self._origin, self._end - self._settings.view_length)
+        start = max(self._origin, self._end - self.settings.view_length)
         seen = self._extract(buffer.lidar(start, self._end))
         view = _core.FixedView([seen], start, self._end, self.samples, self.globals)
         self._views.add(view, self.samples.position_at(start))
@@ -175,13 +180,13 @@ class OdometryPass:
             stretch.angles,
             self.samples,
             self.globals,
-            settings=self._settings.surfels,
+            settings=self.settings.surfels,
             range_sigma=self._core.range_sigma,
             threads=self._threads,
         )
 
     def _window_start(self, end: float) -> float:
-        return max(self._anchor, end - self._settings.window)
+        return max(self._anchor, end - self.settings.window)
 
     def _register(self, imu: _core.Imu | None, new: float) -> None:
         start = self._window_start(self._end)
@@ -239,7 +244,7 @@ class OdometryPass:
 
     def _retire(self) -> None:
         """Freeze what has left the window, and forget what no view can need any more."""
-        next_start = self._window_start(self._end + self._settings.shift)
+        next_start = self._window_start(self._end + self.settings.shift)
         self._views.update(self._surfels, next_start, self.samples, self.globals)
         oldest = self._oldest()
         self._surfels = [(t, s) for t, s in self._surfels if t >= oldest]
@@ -254,8 +259,8 @@ class OdometryPass:
 
     def _oldest(self) -> float:
         """Time from which on samples and surfels may still be needed, s."""
-        next_start = self._window_start(self._end + self._settings.shift)
-        return next_start - self._settings.view_length - self._settings.shift
+        next_start = self._window_start(self._end + self.settings.shift)
+        return next_start - self.settings.view_length - self.settings.shift
 
     def _lap(self, name: str, since: float) -> float:
         now = time.perf_counter()

@@ -48,7 +48,7 @@ def estimate_of(
         std=named_std(last.covariance, last.prior.frozen),
     )
     return Estimate(
-        joined(segments, DT),
+        joined(segments),
         calibration,
         windows=windows,
         counts={

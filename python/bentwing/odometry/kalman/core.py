@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bentwing.base import geometry
-from bentwing.base.calibration import STANDARD_GRAVITY
 from bentwing.base.mount import FixedMount, MotorMount, Mount, Pose
 from bentwing.base.trajectory import DT
 from bentwing.odometry.continuous.slow_states import WALK, initial_std
@@ -17,13 +16,13 @@ from bentwing.odometry.continuous.slow_states import WALK, initial_std
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from bentwing.base.calibration import Calibration
     from bentwing.odometry.kalman.settings import KalmanSettings
     from bentwing.odometry.start import Start
     from bentwing.recording.payload import Imu, Lidar
 
     Transform = tuple[list[float], list[float]]
 
-# Between the poses of the trajectory, s.
 # Places in the tangent, as `bentwing_kalman::at`.
 N_STATES = 31
 ROTATION, POSITION, VELOCITY = slice(0, 3), slice(3, 6), slice(6, 9)
@@ -123,18 +122,18 @@ class FilterState:
     encoder_delay: float
 
 
-def first_state(start: Start, mount: Mount, latency: float = 0.0) -> FilterState:
+def first_state(start: Start, described: Calibration) -> FilterState:
     """Return the state at the start as payload and inertial samples have it."""
-    base, lidar = _mounts(mount)
+    base, lidar = _mounts(described.mount)
     return FilterState(
         pose=([0.0, 0.0, 0.0], start.quat_xyzw.tolist()),
         velocity=[0.0, 0.0, 0.0],
         gyro_bias=start.gyro_bias.tolist(),
         accel_bias=start.accel_bias.tolist(),
-        gravity=[0.0, 0.0, STANDARD_GRAVITY],
+        gravity=described.gravity.tolist(),
         base=_pair(base),
         lidar=_pair(lidar),
-        latency=latency,
+        latency=described.latency,
         encoder_delay=0.0,
     )
 

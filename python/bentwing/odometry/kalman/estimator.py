@@ -4,40 +4,36 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from bentwing.base import geometry
 from bentwing.base.errors import NotEnoughDataError, PayloadError, RecordingError
-from bentwing.base.mount import FixedMount, MotorMount, Mount, Pose
+from bentwing.base.mount import FixedMount, MotorMount, Mount
 from bentwing.base.trajectory import DT
-from bentwing.odometry.buffer import BatchBuffer
-from bentwing.odometry.continuous.planar import refuse_planar_kind, refuse_plane
-from bentwing.odometry.kalman.core import (
-    FilterSettings,
-    FilterState,
-    anchored,
-    first_covariance,
-    first_state,
-    unlearned_delay,
-)
-from bentwing.odometry.kalman.filter_pass import MIN_POINTS, FilterPass, Rest
+from bentwing.odometry.interface import Estimator, Snapshot
+from bentwing.odometry.kalman.beginning import described_beginning
+from bentwing.odometry.kalman.core import FilterSettings
+from bentwing.odometry.kalman.filter_pass import MIN_POINTS, FilterPass
 from bentwing.odometry.kalman.outcome import estimate_of
+from bentwing.odometry.kalman.phases import Rehearsing, Running, Waiting
 from bentwing.odometry.kalman.settings import KalmanSettings
-from bentwing.odometry.segments import MAX_IMU_GAP, extrapolated, heading
-from bentwing.odometry.start import find_start, levelling
-from bentwing.recording.described import described_mount
+from bentwing.odometry.planar import refuse_planar_kind, refuse_plane
+from bentwing.odometry.segments import MAX_IMU_GAP
+from bentwing.odometry.start import find_start
+from bentwing.recording.described import described_calibration
 
 if TYPE_CHECKING:
+    import numpy as np
     from numpy.typing import NDArray
 
     from bentwing.base.breaks import Break
     from bentwing.base.estimate import Estimate
+    from bentwing.base.mount import Pose
     from bentwing.base.trajectory import Trajectory
     from bentwing.odometry.buffer import LidarStretch
-    from bentwing.odometry.kalman.snapshot import FilterSnapshot
-    from bentwing.recording import Batch, Payload
+    from bentwing.odometry.kalman.beginning import Beginning
+    from bentwing.odometry.kalman.phases import Begun, Phase
+    from bentwing.recording import Payload
 
 # The start is judged by the inertial samples of this time, s.
 LOOK_AHEAD = 1.5
@@ -45,8 +41,6 @@ LOOK_AHEAD = 1.5
 BEYOND = 0.02
 # Lidar data without inertial data for so long: there is no IMU, s.
 NO_IMU = 3.0
-# How much less certain a second beginning is of what the first has learned from the same data.
-DOUBT = 2.0
 # Batches that end within this time before the last sweep are held, s.
 HELD = 1.0
 NEEDS_IMU = (
@@ -55,7 +49,7 @@ NEEDS_IMU = (
 )
 
 
-class Kalman:
+class Kalman(Estimator):
     """Error-state iterated Kalman filter; feed batches in time order, then ask for the result.
 
     Mounts and delays are part of the state, but the first views of the map are made while they are
@@ -78,57 +72,53 @@ class Kalman:
         refuse_planar_kind(payload, "the Kalman filter")
         if payload.imu is None:
             raise PayloadError(NEEDS_IMU.format(where="in the payload (imu: null)"))
-        self.settings = settings or KalmanSettings()
+        super().__init__()
+        self.settings: KalmanSettings = settings or KalmanSettings()
         self._payload = payload
         self._imu = payload.imu
-        self._mount = described_mount(payload)
-        self._buffer = BatchBuffer()
-        self._first: float | None = None
-        self._rest: Rest | None = None
-        self._passes: list[FilterPass] = []
+        self._described = described_calibration(payload)
+        self._phase: Phase = Waiting(rehearses=self.settings.rehearsal > 0)
         # What came before the last break.
-        self._before: list[FilterSnapshot] = []
-        self._begun: tuple[FilterState, NDArray[np.float64]] | None = None
-        self._rehearsing = self.settings.rehearsal > 0
-        self._n_small = 0
-        self._lidar_end = 0.0
-        self._angle: float | None = None
+        self._before: list[FilterPass] = []
         self._breaks: list[Break] = []
+        self._n_begun = 0
+        self._n_small = 0
 
-    def feed(self, batch: Batch) -> None:
-        """Take the next batch; sweeps that have become complete are worked in."""
-        self.take(batch)
-        self._advance(finishing=False)
+    @property
+    def step_length(self) -> float:
+        """How much new lidar data a step takes at most, s."""
+        return self.settings.scan
 
-    def take(self, batch: Batch) -> None:
-        """Hold the next batch for `step`."""
-        self._buffer.add(batch)
-
-    def step(self, *, finishing: bool = False) -> FilterSnapshot | None:
-        """Work in one sweep that has become complete; returns what is known then, None without any.
-
-        The result is that of `feed`; `finishing` as `result` does.
-        """
+    def advance(self, *, finishing: bool = False) -> bool:
+        """Begin, take a sweep, begin again, or pass a break; returns whether one was possible."""
         self._require_imu(finishing=finishing)
-        while self._go_on(finishing=finishing):
-            if (current := self.current) is not None and current.windows:
-                return self._snapshot(current)
-        return None
+        lidar, imu = self.buffer.lidar_span, self.buffer.imu_span
+        if lidar is None or imu is None:
+            return False
+        phase, broken, latency = self._phase, self.buffer.first_break(), self._described.latency
+        if isinstance(phase, Waiting):
+            return self._begin(phase, lidar[0] - latency, imu, finishing=finishing)
+        ready = min(lidar[1] - latency, imu[1] + MAX_IMU_GAP if finishing else imu[1] - BEYOND)
+        if broken is not None and broken.start <= ready:
+            ready, finishing = broken.start, True
+        else:
+            broken = None
+        if self._step(phase, ready, finishing=finishing):
+            return True
+        if isinstance(phase, Rehearsing) and finishing and phase.under_way.windows:
+            return self._begin_again(phase)
+        return broken is not None and self._pass_break(phase, broken)
 
-    def result(self) -> Estimate:
-        """Finish with what was fed so far.
-
-        Raises
-        ------
-        NotEnoughDataError
-            There are no two sweeps.
-        RecordingError
-            There are no inertial samples.
-        DivergedError
-            The points do not fit the inertial samples at all.
-        """
-        self._advance(finishing=True)
-        return self.so_far()
+    @property
+    def current(self) -> Snapshot | None:
+        """What the pass under way knows now; None until it has taken a sweep."""
+        phase = self._phase
+        if isinstance(phase, Waiting) or not phase.under_way.windows:
+            return None
+        now = phase.under_way.snapshot(is_settling=isinstance(phase, Rehearsing))
+        passes = [*(p.snapshot() for p in self._before), now]
+        estimate = partial(estimate_of, passes, [*self._breaks], self._n_small)
+        return Snapshot(now, self._n_begun, estimate)
 
     def so_far(self) -> Estimate:
         """Return what the sweeps so far say.
@@ -138,30 +128,15 @@ class Kalman:
         NotEnoughDataError
             There are fewer than two.
         """
-        n = sum(len(p.windows) for p in self._passes)
+        passes = self._passes
+        n = sum(len(p.windows) for p in passes)
         if n < 2:
             msg = (
                 f"{n} sweeps of {self.settings.scan:g} s with lidar points and inertial samples; "
                 "two are needed at least"
             )
             raise NotEnoughDataError(msg)
-        if (current := self.current) is None:
-            return estimate_of(self._before, self._breaks, self._n_small)
-        return self.estimate(self._snapshot(current))
-
-    def estimate(self, last: FilterSnapshot) -> Estimate:
-        """Return what the passes before the last break and this one say, levelled."""
-        return estimate_of([*self._before, last], self._breaks, self._n_small)
-
-    @property
-    def current(self) -> FilterPass | None:
-        """The pass that is under way."""
-        return self._passes[-1] if self._passes and self._first is not None else None
-
-    @property
-    def buffer(self) -> BatchBuffer:
-        """What coming sweeps may need of the batches."""
-        return self._buffer
+        return estimate_of([p.snapshot() for p in passes], self._breaks, self._n_small)
 
     def odometry(self) -> tuple[Trajectory, Trajectory]:
         """Return the high-rate odometry, raw and smoothed, in the frame of the first pose.
@@ -189,149 +164,96 @@ class Kalman:
         This pose is exact, whatever its truth: `pose_covariances` are relative to it.
         """
         last = self._passes[-1]
-        at, quat = last.anchor
-        turn = levelling(np.array(last.filter.gravity))
-        return last.start, Pose(geometry.rotate(turn, at), geometry.multiply(turn, quat))
+        return last.start, last.anchor()
 
     @property
-    def _filter_mount(self) -> Mount:
-        """The mount as the filter takes it: without a zero, and fixed where its turning is ignored."""
-        mount = self._mount
-        if isinstance(mount, FixedMount):
-            return mount
-        if self.settings.rotation == "encoder":
-            return mount.with_zero_behind_motor()
-        return FixedMount(mount.lidar_at(self._angle or 0.0))
-
-    def _snapshot(self, of: FilterPass) -> FilterSnapshot:
-        return of.snapshot(self._filter_mount, is_settling=self._rehearsing)
-
-    def _advance(self, *, finishing: bool) -> None:
-        self._require_imu(finishing=finishing)
-        while self._go_on(finishing=finishing):
-            pass
+    def _passes(self) -> list[FilterPass]:
+        if isinstance(self._phase, Waiting):
+            return self._before
+        return [*self._before, self._phase.under_way]
 
     def _require_imu(self, *, finishing: bool) -> None:
-        span = self._buffer.lidar_span
-        if span is None or self._passes or self._buffer.has_imu:
+        span = self.buffer.lidar_span
+        if span is None or self._passes or self.buffer.has_imu:
             return
         if finishing or span[1] - span[0] > NO_IMU:
             where = f"in the first {span[1] - span[0]:.1f} s of the recording"
             raise RecordingError(NEEDS_IMU.format(where=where))
 
-    def _go_on(self, *, finishing: bool) -> bool:
-        """Do what can be done next: begin, take a sweep, begin again; returns whether so."""
-        lidar, imu = self._buffer.lidar_span, self._buffer.imu_span
-        if lidar is None or imu is None:
-            return False
-        self._lidar_end = lidar[1]
-        if self._first is None:
-            return self._begin(lidar[0], imu, finishing=finishing)
-        broken = self._buffer.first_break()
-        ready = min(lidar[1], imu[1] + MAX_IMU_GAP if finishing else imu[1] - BEYOND)
-        if broken is not None and broken.start <= ready:
-            ready, finishing = broken.start, True
-        if self._step(ready, finishing=finishing):
-            return True
-        if self._rehearsing and finishing and self._passes[-1].windows:
-            return self._begin_again()
-        if broken is not None and broken.start <= ready:
-            return self._pass_break(broken)
-        return False
-
-    def _begin(self, lidar: float, imu: tuple[float, float], *, finishing: bool) -> bool:
+    def _begin(
+        self, phase: Waiting, lidar: float, imu: tuple[float, float], *, finishing: bool
+    ) -> bool:
         if imu[1] - imu[0] < LOOK_AHEAD and not finishing:
             return False
-        first = max(lidar, imu[0] + 2 * DT)
-        seen = self._buffer.imu(imu[0], imu[0] + LOOK_AHEAD)
+        seen = self.buffer.imu(imu[0], imu[0] + LOOK_AHEAD)
         if len(seen.times) < 2:
             return False
-        if isinstance(self._mount, MotorMount):
-            self._angle = self._first_angle(first)
-        start = find_start(seen, self._imu)
-        static = start.static
-        self._rest = None if static is None else Rest(static.gyro_bias, static.accel_mean)
-        mount = self._filter_mount
-        state = first_state(start, mount, self._payload.lidar.latency)
-        covariance = first_covariance(start, mount)
-        if self._passes:
-            state, covariance = self._continued(first, state, covariance)
-        self._first, self._begun = first, (state, covariance)
-        self._passes.append(self._new_pass(state, covariance))
+        first = max(lidar, imu[0] + 2 * DT)
+        start, mount = find_start(seen, self._imu), self._taken_mount(first)
+        beginning = described_beginning(first, start, self._payload, mount)
+        if self._before:
+            beginning = self._before[-1].continued(beginning)
+        begun = self._new_pass(beginning, renew=phase.rehearses)
+        self._phase = Rehearsing(begun) if phase.rehearses else Running(begun)
         return True
 
-    def _continued(
-        self, first: float, state: FilterState, covariance: NDArray[np.float64]
-    ) -> tuple[FilterState, NDArray[np.float64]]:
-        """Return a start behind a break: what was learned, in the direction of the last motion."""
-        before = self._passes[-1]
-        at, quat = extrapolated(before.trajectory(), first)
-        level = np.array(state.pose[1])
-        turn = heading(geometry.multiply(quat, geometry.inverse(level)))
-        placed = at.tolist(), geometry.multiply(turn, level).tolist()
-        return replace(before.slow_state(state), pose=placed), before.slow_covariance(
-            covariance, 1.0
-        )
+    def _taken_mount(self, first: float) -> Mount:
+        """Return the mount as the filter takes it: without a zero, and fixed if its turning is ignored."""
+        mount = self._described.mount
+        if isinstance(mount, FixedMount):
+            return mount
+        if self.settings.rotation == "encoder":
+            return mount.with_zero_behind_motor()
+        stamp = first + self._described.latency
+        angles = self.buffer.lidar(stamp, stamp + 1.0).angles
+        angle = 0.0 if angles is None or not len(angles) else float(angles[0])
+        return FixedMount(mount.lidar_at(angle))
 
-    def _first_angle(self, first: float) -> float:
-        angles = self._buffer.lidar(first, first + 1.0).angles
-        return 0.0 if angles is None or not len(angles) else float(angles[0])
-
-    def _new_pass(self, state: FilterState, covariance: NDArray[np.float64]) -> FilterPass:
+    def _new_pass(self, beginning: Beginning, *, renew: bool) -> FilterPass:
+        """Return a pass; `renew`: its voxels forget what is old."""
         settings = FilterSettings.of(
-            self.settings,
-            self._payload.lidar,
-            self._imu,
-            self._filter_mount,
-            renew=self._rehearsing,
+            self.settings, self._payload.lidar, self._imu, beginning.mount, renew=renew
         )
-        assert self._first is not None
-        return FilterPass(settings, self._first, state, anchored(covariance, state), self._rest)
+        self._n_begun += 1
+        return FilterPass(settings, beginning)
 
-    def _begin_again(self) -> bool:
+    def _begin_again(self, phase: Rehearsing) -> bool:
         """Leave the rehearsal: from the start again, with what was learned."""
-        rehearsed, self._rehearsing = self._passes.pop(), False
-        assert self._begun is not None
-        state = rehearsed.slow_state(self._begun[0])
-        covariance = rehearsed.slow_covariance(self._begun[1], DOUBT)
-        if isinstance(mount := self._filter_mount, MotorMount):
-            covariance += unlearned_delay(rehearsed.motor_rate, mount, state)
-        self._passes.append(self._new_pass(state, covariance))
+        self._phase = Running(self._new_pass(phase.under_way.again(), renew=False))
         self._n_small = 0
         return True
 
-    def _pass_break(self, broken: Break) -> bool:
+    def _pass_break(self, phase: Begun, broken: Break) -> bool:
         """Forget what is before a silence; what follows begins anew."""
         self._breaks.append(broken)
-        self._before.append(self._snapshot(self._passes[-1]))
-        self._buffer.cut(broken.stop)
-        self._first = None
+        self._before.append(phase.under_way)
+        self.buffer.cut(broken.stop)
+        self._phase = Waiting(rehearses=isinstance(phase, Rehearsing))
         return True
 
-    def _step(self, ready: float, *, finishing: bool) -> bool:
+    def _step(self, phase: Begun, ready: float, *, finishing: bool) -> bool:
         """Take the next sweep if it is complete; returns whether it was."""
-        assert self._first is not None
-        current, scan = self._passes[-1], self.settings.scan
-        stop = self._first + scan * (round((current.end - self._first) / scan) + 1)
-        if self._rehearsing and stop - self._first > self.settings.rehearsal:
-            return self._begin_again()
+        now, scan = phase.under_way, self.settings.scan
+        stop = now.start + scan * (round((now.end - now.start) / scan) + 1)
+        if isinstance(phase, Rehearsing) and stop - now.start > self.settings.rehearsal:
+            return self._begin_again(phase)
         if ready < stop:
-            if not finishing or ready - current.end < DT:
+            if not finishing or ready - now.end < DT:
                 return False
             stop = ready
-        sweep = self._sweep(current.end, stop)
-        if not current.windows and not len(self._passes) > 1 and len(sweep.times):
+        sweep = self._sweep(now, stop)
+        if not now.windows and not self._before and len(sweep.times):
             refuse_plane(sweep.points, "the Kalman filter")
         self._n_small += 0 < len(sweep.times) < MIN_POINTS
-        imu = self._buffer.imu(current.end - 2 * BEYOND, stop + BEYOND)
-        current.take(imu, sweep, stop)
-        if not self._rehearsing:
-            self._buffer.forget(stop - HELD)
+        imu = self.buffer.imu(now.end - 2 * BEYOND, stop + BEYOND)
+        now.take(imu, sweep, stop)
+        if isinstance(phase, Running):
+            self.buffer.forget(stop - HELD)
         return True
 
-    def _sweep(self, start: float, stop: float) -> LidarStretch:
-        sweep = self._buffer.lidar(start, stop)
-        if not isinstance(self._filter_mount, MotorMount):
+    def _sweep(self, now: FilterPass, stop: float) -> LidarStretch:
+        sweep = self.buffer.lidar(now.end + now.latency, stop + now.latency)
+        if not isinstance(now.mount, MotorMount):
             return replace(sweep, angles=None)
         if sweep.angles is None and len(sweep.times):
             msg = "angles: expected the motor's angle of every point, got None"

@@ -4,24 +4,27 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bentwing import _core
 from bentwing.base import geometry
+from bentwing.base.mount import MotorMount, Pose
 from bentwing.base.window_record import WindowRecord
-from bentwing.odometry.kalman.core import SLOW, FilterState
+from bentwing.odometry.kalman.core import SLOW, anchored, unlearned_delay
 from bentwing.odometry.kalman.learned import calibration_of
 from bentwing.odometry.kalman.snapshot import FilterSnapshot, joined_poses
+from bentwing.odometry.segments import extrapolated, heading
+from bentwing.odometry.start import levelling
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from bentwing.base.mount import Mount
     from bentwing.base.trajectory import Trajectory
     from bentwing.odometry.buffer import LidarStretch
+    from bentwing.odometry.kalman.beginning import Beginning
     from bentwing.odometry.kalman.core import FilterSettings, Transform
     from bentwing.recording.batches import ImuBatch
 
@@ -32,26 +35,10 @@ if TYPE_CHECKING:
 LEAST_SHARE = 5e-4
 # Fewer points are no sweep.
 MIN_POINTS = 100
-# The mean over a sweep differs from that of the rest by less, rad/s and m/s².
-MAX_REST_RATE, MAX_REST_FORCE = 0.01, 0.15
+# How much less certain a second beginning is of what the first has learned from the same data.
+DOUBT = 2.0
 # Of a carrier at rest, m/s.
 REST_SPEED = 3e-3
-
-
-@dataclass(frozen=True, slots=True)
-class Rest:
-    """Mean rate (3,), rad/s, and specific force (3,), m/s², of an IMU at rest."""
-
-    rate: NDArray[np.float64]
-    force: NDArray[np.float64]
-
-    def lasts(self, imu: ImuBatch) -> bool:
-        """Tell whether samples around a sweep are those of the same rest."""
-        if not len(imu.times):
-            return False
-        turned = np.linalg.norm(imu.gyro.mean(axis=0) - self.rate)
-        pushed = np.linalg.norm(imu.accel.mean(axis=0) - self.force)
-        return bool(turned < MAX_REST_RATE and pushed < MAX_REST_FORCE)
 
 
 class FilterPass:
@@ -59,25 +46,22 @@ class FilterPass:
 
     Parameters
     ----------
-    time, state, covariance : at the start
-    rest : what the IMU says at rest, if that is how it begins
+    beginning : what it begins with
     """
 
-    def __init__(
-        self,
-        settings: FilterSettings,
-        time: float,
-        state: FilterState,
-        covariance: NDArray[np.float64],
-        rest: Rest | None = None,
-    ) -> None:
-        self._rest = rest
+    def __init__(self, settings: FilterSettings, beginning: Beginning) -> None:
+        self._beginning = beginning
+        state = beginning.state
+        # Samples that are those of the rest at the start, as long as there are.
+        self._rest = beginning.rest
         self.filter = _core.KalmanFilter(
-            settings, time=time, state=state, covariance=np.ascontiguousarray(covariance)
+            settings,
+            time=beginning.time,
+            state=state,
+            covariance=np.ascontiguousarray(anchored(beginning.covariance, state)),
         )
-        self.start = time
-        # Of the motor, or the fixed lidar, as the map begins: what the frame hangs on.
-        self.anchor = _composed(state.pose, state.base)
+        self.start, self.mount = beginning.time, beginning.mount
+        self.latency = beginning.latency
         self.windows: list[WindowRecord] = []
         self.blind = 0.0
         self.seconds = 0.0
@@ -131,13 +115,12 @@ class FilterPass:
         covariances = np.array([c for _, c in self._covariances]).reshape(-1, 6, 6)
         return times, covariances
 
-    def snapshot(self, mount: Mount, *, is_settling: bool) -> FilterSnapshot:
+    def snapshot(self, *, is_settling: bool = False) -> FilterSnapshot:
         """Return what has been found so far, to be read while the filter goes on."""
         return FilterSnapshot(
-            self.start,
-            self.end,
+            self.end + self.latency,
             np.array(self.filter.gravity),
-            calibration_of(self.filter, self.motor_rate, mount),
+            calibration_of(self.filter, self.motor_rate, self.mount),
             [*self.windows],
             [*self._poses],
             self.blind,
@@ -145,28 +128,47 @@ class FilterPass:
             is_settling,
         )
 
-    def slow_state(self, start: FilterState) -> FilterState:
-        """Return `start` with the biases, gravity, mounts and delays of now."""
-        now = self.filter
-        return FilterState(
-            start.pose,
-            start.velocity,
-            now.gyro_bias,
-            now.accel_bias,
-            now.gravity,
-            now.base,
-            now.lidar,
-            now.latency,
-            now.encoder_delay,
-        )
+    def anchor(self) -> Pose:
+        """Return where the motor, or the fixed lidar, is as the map begins, level."""
+        at, quat = _composed(self._beginning.state.pose, self._beginning.state.base)
+        turn = levelling(np.array(self.filter.gravity))
+        return Pose(geometry.rotate(turn, at), geometry.multiply(turn, quat))
 
-    def slow_covariance(self, start: NDArray[np.float64], growth: float) -> NDArray[np.float64]:
-        """Return `start` (31, 31) with what is known of the slow states now, `growth` times as uncertain."""
-        covariance = start.copy()
+    def again(self) -> Beginning:
+        """Return the beginning with what this pass, a rehearsal, has learned."""
+        learned = self._learned(self._beginning, DOUBT)
+        if isinstance(self.mount, MotorMount):
+            delay = unlearned_delay(self.motor_rate, self.mount, learned.state)
+            learned = replace(learned, covariance=learned.covariance + delay)
+        return learned
+
+    def continued(self, beginning: Beginning) -> Beginning:
+        """Return a beginning behind a break: what was learned, in the direction of the last motion."""
+        at, quat = extrapolated(self.trajectory(), beginning.time)
+        level = np.array(beginning.state.pose[1])
+        turn = heading(geometry.multiply(quat, geometry.inverse(level)))
+        placed = at.tolist(), geometry.multiply(turn, level).tolist()
+        learned = self._learned(beginning, 1.0)
+        return replace(learned, state=replace(learned.state, pose=placed))
+
+    def _learned(self, beginning: Beginning, growth: float) -> Beginning:
+        """Return a beginning with the slow states of now, `growth` times as uncertain."""
+        now = self.filter
+        state = replace(
+            beginning.state,
+            gyro_bias=now.gyro_bias,
+            accel_bias=now.accel_bias,
+            gravity=now.gravity,
+            base=now.base,
+            lidar=now.lidar,
+            latency=now.latency,
+            encoder_delay=now.encoder_delay,
+        )
+        covariance = beginning.covariance.copy()
         covariance[SLOW, :] = covariance[:, SLOW] = 0.0
         block = np.ix_(SLOW, SLOW)
-        covariance[block] = growth**2 * self.filter.covariance[block]
-        return covariance
+        covariance[block] = growth**2 * now.covariance[block]
+        return replace(beginning, state=state, covariance=covariance)
 
     def _watch_motor(self, sweep: LidarStretch) -> None:
         if sweep.angles is not None and sweep.times[-1] > sweep.times[0]:

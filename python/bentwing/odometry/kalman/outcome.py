@@ -6,7 +6,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from bentwing.base.estimate import Estimate
-from bentwing.base.trajectory import DT
 from bentwing.odometry.segments import joined
 
 if TYPE_CHECKING:
@@ -38,7 +37,7 @@ def estimate_of(
     windows = [w for p in passes for w in p.windows]
     blind = sum(p.blind for p in passes)
     return Estimate(
-        joined(parts, DT),
+        joined(parts),
         passes[-1].calibration,
         windows=windows,
         counts={

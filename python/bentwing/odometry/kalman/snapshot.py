@@ -4,15 +4,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing import _core
-from bentwing.base import geometry
-from bentwing.base.trajectory import DT, Trajectory
-from bentwing.odometry.core_states import core_globals
+from bentwing.base.trajectory import Trajectory
+from bentwing.odometry.level_snapshot import LevelSnapshot
+from bentwing.odometry.segments import turned
 from bentwing.odometry.start import levelling
 
 if TYPE_CHECKING:
@@ -28,12 +26,12 @@ N_RECENT = 10
 
 
 @dataclass(frozen=True)
-class FilterSnapshot:
+class FilterSnapshot(LevelSnapshot):
     """What a run of the filter has found, level; everything is a copy or is never changed.
 
     Attributes
     ----------
-    start, end : s, of the lidar data used
+    end : stamp up to which lidar data was used, s
     gravity : (3,) m/s², as the filter has it, by which the poses are levelled
     calibration : the slow states
     windows : records of the sweeps
@@ -42,7 +40,6 @@ class FilterSnapshot:
     is_settling : whether it is a rehearsal
     """
 
-    start: float
     end: float
     gravity: NDArray[np.float64]
     calibration: Calibration
@@ -52,10 +49,6 @@ class FilterSnapshot:
     seconds: float
     is_settling: bool
 
-    def snapshot(self) -> FilterSnapshot:
-        """Return itself."""
-        return self
-
     def trajectory(self) -> Trajectory:
         """Return all poses, 100 a second."""
         return self._levelled(self.poses)
@@ -64,34 +57,8 @@ class FilterSnapshot:
         """Return the poses of the last second."""
         return self._levelled(self.poses[-N_RECENT:])
 
-    def level(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return points (N, 3) that `samples` has placed, which is level already."""
-        return points
-
-    def normals(self) -> NDArray[np.float64]:
-        """Return no normals (0, 3): the filter keeps none."""
-        return np.empty((0, 3))
-
-    @cached_property
-    def samples(self) -> _core.Samples:
-        """The recent poses, to place points by."""
-        recent = self.recent()
-        return _core.Samples(
-            float(recent.times[0]), DT, recent.positions.copy(), recent.quats_xyzw.copy()
-        )
-
-    @cached_property
-    def globals(self) -> _core.Globals:
-        """The slow states, gravity vertical."""
-        return core_globals(self.calibration)
-
     def _levelled(self, parts: list[Poses]) -> Trajectory:
-        trajectory, turn = joined_poses(parts), levelling(self.gravity)
-        return Trajectory(
-            trajectory.times,
-            geometry.rotate(turn, trajectory.positions),
-            geometry.multiply(turn, trajectory.quats_xyzw),
-        )
+        return turned(joined_poses(parts), levelling(self.gravity))
 
 
 def joined_poses(parts: list[Poses]) -> Trajectory:

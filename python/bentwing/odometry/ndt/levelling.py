@@ -3,11 +3,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bentwing.base import geometry
+from bentwing.odometry.segments import turned
 from bentwing.odometry.start import levelling
 
 if TYPE_CHECKING:
@@ -21,6 +23,24 @@ SPAN = 10.0
 # The change of velocity is that of the mean velocities over this time, s.
 VELOCITY_SPAN = 0.3
 LEVEL = np.array([0.0, 0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """The level map, seen from that of the first scan.
+
+    Attributes
+    ----------
+    turn : (4,) from the map of the first scan
+    origin : (3,) m, in the map of the first scan
+    """
+
+    turn: NDArray[np.float64]
+    origin: NDArray[np.float64]
+
+    def level(self, trajectory: Trajectory) -> Trajectory:
+        """Return a trajectory of the first scan's map in this one."""
+        return turned(trajectory, self.turn, self.origin)
 
 
 class Levelling:
@@ -37,7 +57,22 @@ class Levelling:
         self._times.append(batch.times)
         self._forces.append(batch.accel)
 
-    def turn(self, trajectory: Trajectory) -> NDArray[np.float64]:
+    def copy(self) -> Levelling:
+        """Return what is collected by now."""
+        collected = Levelling()
+        collected._times, collected._forces = [*self._times], [*self._forces]
+        return collected
+
+    @property
+    def has_samples(self) -> bool:
+        """Whether there is an IMU."""
+        return bool(self._times)
+
+    def frame(self, trajectory: Trajectory) -> Frame:
+        """Return the level map that begins with a trajectory of the first scan's map."""
+        return Frame(self._turn(trajectory), trajectory.positions[0])
+
+    def _turn(self, trajectory: Trajectory) -> NDArray[np.float64]:
         """Quaternion (4,) that makes a trajectory's map level; none without samples.
 
         The force turned into the map is gravity plus acceleration, whose mean is the change of the

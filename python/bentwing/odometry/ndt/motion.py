@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -13,6 +14,8 @@ from bentwing.base.trajectory import DT, Trajectory
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    from bentwing.base.mount import Pose
 
     Array = NDArray[np.float64]
 
@@ -56,6 +59,11 @@ class Placed:
     translation: Array
     quat_xyzw: Array
 
+    def behind(self, mounted: Pose) -> Placed:
+        """Pose of what is mounted on the frame."""
+        at = geometry.compose(self.translation, self.quat_xyzw, mounted.translation)
+        return Placed(self.time, at, geometry.multiply(self.quat_xyzw, mounted.quaternion))
+
 
 def twist_between(before: Placed, after: Placed) -> Twist:
     """Return the constant twist that leads from one pose to another, in the imu frame of the later."""
@@ -76,6 +84,16 @@ class Track:
     def last(self) -> Placed:
         """The newest pose."""
         return self.poses[-1]
+
+    def copy(self) -> Track:
+        """Return the track as it is now."""
+        return self.sliced(0)
+
+    def sliced(self, first: int, stop: int | None = None) -> Track:
+        """Return the poses of a slice, which must not be empty, as a track."""
+        part = copy(self)
+        part.poses = self.poses[first:stop]
+        return part
 
     def add(self, pose: Placed) -> None:
         """Take the next pose."""

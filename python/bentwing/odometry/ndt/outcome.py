@@ -3,21 +3,22 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from bentwing.base import geometry
-from bentwing.base.calibration import STANDARD_GRAVITY, Calibration
+from bentwing.base.estimate import Estimate
 from bentwing.base.trajectory import DT, Trajectory
 from bentwing.base.window_record import WindowRecord
+from bentwing.odometry.ndt.levelling import SPAN, VELOCITY_SPAN
 from bentwing.odometry.segments import joined
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from bentwing.base.mount import Mount
-    from bentwing.odometry.ndt.levelling import Levelling
+    from bentwing.base.breaks import Break
+    from bentwing.base.calibration import Calibration
+    from bentwing.odometry.ndt.levelling import Frame, Levelling
     from bentwing.odometry.ndt.matching import Match
     from bentwing.odometry.ndt.motion import Track
 
@@ -28,34 +29,79 @@ LEAST_SHARE = 5e-4
 FEW = 0.02
 
 
-def calibration_of(mount: Mount) -> Calibration:
-    """Return the calibration as the payload has it; NDT odometry estimates nothing of it."""
-    up = np.array([0.0, 0.0, STANDARD_GRAVITY])
-    return Calibration(0.0, mount, np.zeros(3), np.zeros(3), up)
+@dataclass(frozen=True, slots=True)
+class Found:
+    """What the scans up to one have found; nothing of it changes any more.
+
+    Attributes
+    ----------
+    tracks : between two of them the place was lost
+    stamps : s, of the first return, and up to which there are scans
+    calibration : as the payload describes it
+    """
+
+    tracks: list[Track]
+    stamps: tuple[float, float]
+    levelling: Levelling
+    calibration: Calibration
+    windows: list[WindowRecord]
+    breaks: list[Break]
+    counts: dict[str, int]
+    timings: dict[str, float]
+
+    @property
+    def starts(self) -> list[float]:
+        """When the tracks begin, s, IMU clock."""
+        first = self.stamps[0] - self.calibration.latency
+        return [first, *(t.poses[0].time for t in self.tracks[1:])]
+
+    @property
+    def ends(self) -> list[float]:
+        """When the tracks end, s, IMU clock."""
+        last = self.stamps[1] - self.calibration.latency
+        return [*(t.last.time for t in self.tracks[:-1]), last]
+
+    @property
+    def can_be_level(self) -> bool:
+        """Whether there is enough of the beginning to know the vertical."""
+        return self.ends[0] - self.starts[0] >= 2 * VELOCITY_SPAN
+
+    @property
+    def is_settling(self) -> bool:
+        """Whether later scans may still tilt the map."""
+        return self.levelling.has_samples and self.ends[0] - self.starts[0] < SPAN
+
+    def parts(self) -> list[Trajectory]:
+        """Return the trajectories of the tracks, in the map of the first scan."""
+        starts = self.starts
+        spans = zip(self.tracks, starts, self.ends, strict=True)
+        parts = [track.trajectory(start, end) for track, start, end in spans]
+        until = zip(parts[:-1], starts[1:], strict=True)
+        return [*(_until(part, start) for part, start in until), parts[-1]]
+
+    def frame(self) -> Frame:
+        """Return the level map, by the beginning alone, at a cost that does not grow with time."""
+        track, start, end = self.tracks[0], self.starts[0], self.ends[0]
+        until = start + SPAN
+        # A pose shapes the way as far as to the second one before it.
+        shaping = track.sliced(0, bisect_left(track.poses, until, key=lambda pose: pose.time) + 2)
+        return self.levelling.frame(shaping.trajectory(start, min(end, until + DT)))
 
 
-def levelled_trajectory(
-    tracks: list[Track], span: tuple[float, float], levelling: Levelling
-) -> tuple[Trajectory, list[tuple[float, float]]]:
-    """Poses over the whole recording, level and from the origin on, and the span of each track."""
-    starts = [span[0], *(t.poses[0].time for t in tracks[1:])]
-    stops = [*(t.last.time for t in tracks[:-1]), span[1]]
-    parts = [t.trajectory(a, b) for t, a, b in zip(tracks, starts, stops, strict=True)]
-    parts = [
-        *(_until(p, start) for p, start in zip(parts[:-1], starts[1:], strict=True)),
-        parts[-1],
-    ]
-    turn, origin = levelling.turn(parts[0]), parts[0].positions[0]
-    level = [
-        Trajectory(
-            p.times,
-            geometry.rotate(turn, p.positions - origin),
-            geometry.multiply(turn, p.quats_xyzw),
-        )
-        for p in parts
-    ]
-    segments = [(float(p.times[0]), float(p.times[-1])) for p in level]
-    return joined(level, DT), segments
+def estimate_of(found: Found) -> Estimate:
+    """Return poses over the whole recording, level and from the origin on."""
+    frame = found.frame()
+    level = [frame.level(part) for part in found.parts()]
+    return Estimate(
+        joined(level),
+        found.calibration,
+        windows=found.windows,
+        counts=found.counts,
+        timings=found.timings,
+        health=_health(found.windows),
+        breaks=found.breaks,
+        segments=[(float(p.times[0]), float(p.times[-1])) for p in level],
+    )
 
 
 def record_of(time: float, n_surfaces: int, match: Match | None) -> WindowRecord:
@@ -84,7 +130,7 @@ def record_of(time: float, n_surfaces: int, match: Match | None) -> WindowRecord
     )
 
 
-def health_of(windows: Sequence[WindowRecord]) -> list[str]:
+def _health(windows: Sequence[WindowRecord]) -> list[str]:
     """Return sentences about what makes the estimate worse than usual."""
     sentences = []
     lost = [w.time for w in windows if not w.registered]

@@ -10,12 +10,13 @@ import numpy as np
 
 from bentwing import _core
 from bentwing.base import geometry
+from bentwing.base.mount import FixedMount, Mount, Pose
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bentwing.odometry.buffer import LidarStretch
-    from bentwing.odometry.ndt.motion import Twist
+    from bentwing.odometry.ndt.motion import Placed, Twist
 
 # Between these the motion is straight, s.
 STEP = 0.01
@@ -28,9 +29,9 @@ class Scan:
     Attributes
     ----------
     points : (N, 3) float64, m, lidar frame
-    times : (N,) float64, s, non-decreasing
+    times : (N,) float64, s, lidar clock, non-decreasing
     angles : (N,) float64 or None, rad, encoder angle at each point
-    time : s, mean of `times`: the pose of the scan is that of this time
+    time : s, IMU clock, of the mean of `times`: the pose of the scan is that of this time
     """
 
     points: NDArray[np.float64]
@@ -39,9 +40,10 @@ class Scan:
     time: float
 
     @classmethod
-    def of(cls, returns: LidarStretch) -> Scan:
-        """Make a scan of at least one return."""
-        return cls(returns.points, returns.times, returns.angles, float(returns.times.mean()))
+    def of(cls, returns: LidarStretch, latency: float) -> Scan:
+        """Make a scan of at least one return, whose stamps are late by `latency`, s."""
+        time = float(returns.times.mean()) - latency
+        return cls(returns.points, returns.times, returns.angles, time)
 
     def some(self, chosen: NDArray[np.intp]) -> Scan:
         """Return the scan with some of its points, its time unchanged."""
@@ -53,10 +55,18 @@ class Scan:
 
         Every point is turned by the encoder's angle of its own time (Tazir 2020, eqs. 4 to 6).
         """
-        start = float(self.times[0]) - STEP
-        n = int((float(self.times[-1]) - start) / STEP) + 2
+        start = float(self.times[0]) - head.latency - STEP
+        n = int((float(self.times[-1]) - head.latency - start) / STEP) + 2
         since = start + STEP * np.arange(n) - self.time
         motion = _core.Samples(
             start, STEP, since[:, None] * twist.v, geometry.exp(since[:, None] * twist.omega)
         )
         return motion.place(self.points, self.times, self.angles, head, threads=threads)
+
+    def lidar_at(self, pose: Placed, mount: Mount) -> Placed:
+        """Pose of the lidar at the scan's time, given that of the IMU."""
+        if isinstance(mount, FixedMount):
+            return pose.behind(mount.T_imu_lidar)
+        angle = mount.encoder_zero + (0.0 if self.angles is None else float(self.angles.mean()))
+        turned = Pose(np.zeros(3), geometry.exp(angle * mount.axis))
+        return pose.behind(mount.T_imu_motor).behind(turned).behind(mount.T_motor_lidar)

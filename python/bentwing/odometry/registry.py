@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""The estimators by name, each with the model of its settings."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from bentwing.base.errors import UsageError
+from bentwing.odometry.continuous.estimator import Continuous
+from bentwing.odometry.continuous.settings import ContinuousSettings
+from bentwing.odometry.kalman import Kalman, KalmanSettings
+from bentwing.odometry.ndt import Ndt, NdtSettings
+from bentwing.recording.payload import Payload
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from pydantic import BaseModel
+
+    from bentwing.odometry.interface import Estimator
+
+ESTIMATORS: dict[str, tuple[Callable[..., Estimator], type[BaseModel]]] = {
+    "continuous": (Continuous, ContinuousSettings),
+    "kalman": (Kalman, KalmanSettings),
+    "ndt": (Ndt, NdtSettings),
+}
+
+
+def create(
+    name: str,
+    payload: Payload,
+    settings: BaseModel | None = None,
+    threads: int | None = None,
+) -> Estimator:
+    """Return an estimator.
+
+    Parameters
+    ----------
+    name : one of `ESTIMATORS`
+    payload : the sensor head
+    settings : of the model that belongs to the name; default: its defaults
+    threads : default: all cores
+
+    Raises
+    ------
+    UsageError
+        If there is no estimator of that name.
+    TypeError
+        If payload or settings are of another type.
+    """
+    require_estimator(name)
+    engine, model = ESTIMATORS[name]
+    _require_type("payload", payload, Payload, name)
+    if settings is not None:
+        _require_type("settings", settings, model, name)
+    return engine(payload, settings, threads)
+
+
+def require_estimator(name: str) -> None:
+    """Refuse an estimator that does not exist, before anything is read."""
+    if name not in ESTIMATORS:
+        *others, last = ESTIMATORS
+        msg = f"estimator {name!r} is not known; choose {', '.join(others)} or {last}"
+        raise UsageError(msg)
+
+
+def _require_type(argument: str, value: object, expected: type[BaseModel], name: str) -> None:
+    if not isinstance(value, expected):
+        found = value if isinstance(value, (dict, str)) else type(value).__name__
+        msg = f"{argument}: expected {expected.__name__} for the estimator {name!r}, got {found!r}"
+        raise TypeError(msg)

@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""NDT odometry live: the same result as offline, and a pose at any time."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from bentwing import Odometry
+from bentwing.odometry import Ndt
+from bentwing.odometry.ndt import NdtSettings
+from bentwing.recording import ImuBatch, LidarBatch
+from bentwing.recording.preprocess import preprocess
+
+SETTINGS = NdtSettings(max_points=1000)
+LENGTH = 9.0
+
+
+@pytest.fixture(scope="module")
+def fixed(simulated, read_flight):
+    """The first seconds of a flight with a fixed lidar."""
+    return read_flight(simulated("office", 22.0, head="vlp16-fixed"), LENGTH, 3)
+
+
+def offline(flight, payload=None):
+    payload = payload or flight.payload
+    engine = Ndt(payload, SETTINGS)
+    for batch in preprocess(flight.batches, payload, Counter()):
+        engine.feed(batch)
+    return engine.result()
+
+
+@pytest.fixture(scope="module")
+def flown(fixed):
+    """An odometry that was fed in pieces, what it said meanwhile, and its result."""
+    said = []
+    with Odometry(fixed.payload, estimator="ndt", settings=SETTINGS) as odometry:
+        for i, piece in enumerate(fixed.pieces):
+            odometry.feed(piece)
+            if isinstance(piece, ImuBatch) and i % 10 == 0:
+                assert odometry.wait(60.0)
+                if odometry.status != "waiting":
+                    said.append((odometry.pose(), odometry.status))
+        cloud = odometry.map_points()
+        halfway = odometry.estimate()
+        final = odometry.finish()
+    return said, cloud, halfway, final
+
+
+def test_a_replay_in_pieces_gives_the_bytes_of_the_offline_estimate(flown, fixed, all_bytes):
+    assert all_bytes(flown[3]) == all_bytes(offline(fixed))
+
+
+def test_a_motor_turned_lidar_gives_the_same_bytes(turning, all_bytes):
+    with Odometry(turning.payload, estimator="ndt", settings=SETTINGS) as odometry:
+        for batch in turning.batches:
+            odometry.feed(batch)
+        assert all_bytes(odometry.finish()) == all_bytes(offline(turning))
+
+
+def test_poses_are_young_and_near_the_final_ones(flown):
+    """A scan, the part of the next one that is there, and the piece under way.
+
+    Scans are known to a centimetre or two, and a velocity from three of them to 10 cm/s.
+    """
+    said, *_, final = flown
+    times = np.array([pose.time for pose, _ in said])
+    assert max(pose.predicted for pose, _ in said) < 0.25
+    inside = (times > 2.0) & (times <= final.trajectory.times[-1])
+    assert inside.sum() > 20
+    positions, _ = final.trajectory.interpolate(times[inside])
+    found = np.array([pose.position for pose, _ in said])[inside]
+    errors = np.linalg.norm(found - positions, axis=1)
+    assert errors.max() < 0.05
+
+
+def test_the_vertical_is_learned_in_the_first_ten_seconds(flown):
+    said, *_ = flown
+    assert said[0][0].time < 1.0
+    assert {status for _, status in said} == {"initializing"}
+
+
+def test_the_map_has_points_of_the_room(flown):
+    _, cloud, *_ = flown
+    assert len(cloud) > 3000
+    assert np.abs(cloud).max() < 30.0
+
+
+def test_what_is_known_on_the_way_is_the_beginning_of_the_result(flown):
+    """But for the last scans, which go on straight until the next one comes."""
+    *_, halfway, final = flown
+    positions, _ = final.trajectory.interpolate(halfway.trajectory.times[:-50])
+    assert np.abs(halfway.trajectory.positions[:-50] - positions).max() < 0.01
+
+
+def test_a_lidar_alone_is_followed_and_predicted_at_constant_velocity(fixed, all_bytes):
+    payload = fixed.payload.model_copy(update={"imu": None, "T_imu_lidar": None})
+    statuses = set()
+    with Odometry(payload, estimator="ndt", settings=SETTINGS) as odometry:
+        for piece in fixed.pieces:
+            if isinstance(piece, LidarBatch):
+                odometry.feed(piece)
+                odometry.wait(60.0)
+                statuses.add(odometry.status)
+        newest = odometry.pose()
+        later = odometry.pose(at=newest.time + 0.1)
+        final = odometry.finish()
+    assert later.position == pytest.approx(newest.position + 0.1 * newest.velocity, abs=1e-3)
+    assert "tracking" in statuses
+    assert "initializing" not in statuses
+    lidar = [b for b in fixed.batches if isinstance(b, LidarBatch)]
+    engine = Ndt(payload, SETTINGS)
+    for batch in preprocess(lidar, payload, Counter()):
+        engine.feed(batch)
+    assert all_bytes(final) == all_bytes(engine.result())

@@ -20,6 +20,10 @@ if TYPE_CHECKING:
     from bentwing.recording.batches import Batch
 
 
+HELD = 1.0
+"""Batches that end within this time before the last sweep or scan are not forgotten, s."""
+
+
 @dataclass(frozen=True, slots=True)
 class LidarStretch:
     """Lidar points of a stretch of time; fields as in `LidarBatch`."""

@@ -23,21 +23,21 @@ def core_globals(calibration: Calibration) -> _core.Globals:
     mount = calibration.mount
     if isinstance(mount, FixedMount):
         return _core.Globals(
-            _pair(mount.T_imu_lidar),
+            core_pose(mount.T_imu_lidar),
             latency=calibration.latency,
             gyro_bias=calibration.gyro_bias,
             accel_bias=calibration.accel_bias,
             gravity=calibration.gravity,
         )
     return _core.Globals(
-        _pair(mount.T_imu_motor),
+        core_pose(mount.T_imu_motor),
         latency=calibration.latency,
         gyro_bias=calibration.gyro_bias,
         accel_bias=calibration.accel_bias,
         gravity=calibration.gravity,
         motor_axis=mount.axis,
         encoder_zero=mount.encoder_zero,
-        T_motor_lidar=_pair(mount.T_motor_lidar),
+        T_motor_lidar=core_pose(mount.T_motor_lidar),
     )
 
 
@@ -79,5 +79,6 @@ def core_samples(trajectory: Trajectory) -> _core.Samples:
     )
 
 
-def _pair(pose: Pose) -> tuple[list[float], list[float]]:
+def core_pose(pose: Pose) -> tuple[list[float], list[float]]:
+    """Return translation and quaternion of a pose."""
     return pose.translation.tolist(), pose.quaternion.tolist()

@@ -188,12 +188,9 @@ class Odometry:
             If the estimate has failed.
         """
         self._worker.require_health()
-        at = None if at is None else float(at)
-        pose = self._state.pose(at, self._newest_point)
-        if pose is None and at is not None:
-            pose = past_pose(self.trajectory, at)
-        assert pose is not None  # of None the newest is returned
-        return pose
+        time = self._state.newest_time(self._newest_point) if at is None else float(at)
+        pose = self._state.pose(time, self._newest_point)
+        return past_pose(self.trajectory, time) if pose is None else pose
 
     @property
     def trajectory(self) -> Trajectory:

@@ -78,8 +78,19 @@ class LiveState:
             self._newest = newer
             self._imu.forget(float(newer.prediction.recent.times[-1]) - 2 * OVERLAP)
 
-    def pose(self, at: float | None, newest_point: float) -> StampedPose | None:
-        """Return the pose at a time or, without one, at the newest data; None before `recent`.
+    def newest_time(self, newest_point: float) -> float:
+        """Return the time of the newest data, or of the newest pose if that is later, s.
+
+        Raises
+        ------
+        NotEnoughDataError
+            There is no pose yet.
+        """
+        with self._lock:
+            return self._newest_time(newest_point)
+
+    def pose(self, at: float, newest_point: float) -> StampedPose | None:
+        """Return the pose at a time, s; None if that is before the recent ones.
 
         Raises
         ------
@@ -87,9 +98,7 @@ class LiveState:
             As `Odometry.pose`.
         """
         with self._lock:
-            prediction = self.require().prediction
-            newest = max(self._data_end(newest_point), float(prediction.recent.times[-1]))
-            at = newest if at is None else at
+            newest, prediction = self._newest_time(newest_point), self.require().prediction
             if not at <= newest + MAX_EXTRAPOLATION:
                 msg = (
                     f"at: {at:.3f} s is more than {MAX_EXTRAPOLATION:g} s beyond the newest data, "
@@ -103,6 +112,10 @@ class LiveState:
         with self._lock:
             newest = self._newest
             return 0.0 if newest is None else self._data_end(newest_point) - newest.registered.end
+
+    def _newest_time(self, newest_point: float) -> float:
+        recent = self.require().prediction.recent
+        return max(self._data_end(newest_point), float(recent.times[-1]))
 
     def _data_end(self, newest_point: float) -> float:
         return self._imu.end if len(self._imu) else newest_point

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 from bentwing.base.breaks import HEAD, Break
 from bentwing.base.errors import NotEnoughDataError
 from bentwing.base.trajectory import DT
-from bentwing.odometry.continuous.beginning import Situation, begin_pass
-from bentwing.odometry.continuous.core_settings import CoreSettings
+from bentwing.odometry.continuous.beginning import begin_pass, find_beginning
 from bentwing.odometry.continuous.odometry_pass import MARGIN
 from bentwing.odometry.continuous.outcome import estimate_of
 from bentwing.odometry.continuous.phases import Bridging, Running, Stalled, Waiting
@@ -21,7 +20,6 @@ from bentwing.odometry.interface import Estimator, Snapshot
 from bentwing.odometry.planar import is_plane
 from bentwing.odometry.segments import JUDGED, MAX_IMU_GAP, found_again
 from bentwing.odometry.stall import LOST_AFTER
-from bentwing.odometry.start import find_start, level_start
 from bentwing.recording import LidarBatch
 from bentwing.recording.described import described_mount
 
@@ -29,11 +27,8 @@ if TYPE_CHECKING:
     from bentwing.base.estimate import Estimate
     from bentwing.odometry.continuous.odometry_pass import OdometryPass
     from bentwing.odometry.continuous.phases import Begun, Phase
-    from bentwing.odometry.start import Start
     from bentwing.recording import Batch, Payload
 
-# A rest shorter than this is waited out before the start is judged, s.
-LOOK_AHEAD = 6.0
 # At the beginning and behind a break the motion is a guess that must not grow until the lidar corrects
 # it: so many windows instead of one.
 CAREFUL_STEPS = 3
@@ -144,34 +139,17 @@ class Continuous(Estimator):
         return min(lidar[1], imu[1] + MAX_IMU_GAP if finishing else imu[1] - 2 * MARGIN)
 
     def _begin(self, ready: float, *, finishing: bool) -> bool:
-        """Find the start once enough has been seen; returns whether it was."""
-        lidar, imu = self.buffer.lidar_span, self.buffer.imu_span
-        if lidar is None or (ready - lidar[0] < LOOK_AHEAD and not finishing):
+        """Begin a pass once enough has been seen; returns whether it was."""
+        payload, settings = self._payload, self.settings
+        beginning = find_beginning(self.buffer, payload, settings, ready=ready, finishing=finishing)
+        if beginning is None:
             return False
-        if imu is None or self._payload.imu is None:
-            start, first, sliding = level_start(lidar[0]), lidar[0], self.settings.without_imu()
-        else:
-            # The trajectory begins with the later of both sensors.
-            first, sliding = max(lidar[0], imu[0] + 2 * DT), self.settings
-            start = find_start(self.buffer.imu(imu[0], imu[1] + 1.0), self._payload.imu)
-            still_resting = start.static is not None and start.hold >= imu[1] - 1.0
-            if still_resting and not finishing:
-                return False
-        self._phase = Running(self._new_pass(start, first, sliding))
-        return True
-
-    def _new_pass(self, start: Start, first: float, sliding: ContinuousSettings) -> OdometryPass:
-        situation = Situation(
-            self._payload,
-            sliding,
-            CoreSettings.of(self.settings.registration, self._payload, DT),
-            self._threads,
-            has_imu=self.buffer.has_imu,
-        )
-        begun = begin_pass(situation, start, first, self._before[-1] if self._before else None)
-        if start.static is not None and self.settings.n_views:
+        before = self._before[-1] if self._before else None
+        begun = begin_pass(beginning, payload, before, self._threads)
+        if beginning.start.static is not None and settings.n_views:
             begun.look_around(self.buffer)
-        return begun
+        self._phase = Running(begun)
+        return True
 
     def _step(self, phase: Begun, ready: float, *, finishing: bool) -> bool:
         """Register the next window if its data is complete; returns whether it was."""

@@ -7,6 +7,7 @@ the head has done so far.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,6 +26,14 @@ SPINNING = 1.5
 _FEWEST = 20
 
 
+@dataclass(slots=True)
+class _Bins:
+    """Those of a stall: the first one, and the first one after it, once it has ended."""
+
+    first: int
+    after: int | None = None
+
+
 class SpinWatch:
     """Medians of the rate of turn in bins, and where they are slow.
 
@@ -39,8 +48,7 @@ class SpinWatch:
         self._rates: list[NDArray[np.float64]] = []
         self._angle: tuple[float, float] | None = None
         self._moving: list[float] = []
-        # Bins of stalls: first one, and the first one after it; a stall that lasts has no end yet.
-        self._stalls: list[list[int | None]] = []
+        self._stalls: list[_Bins] = []
         self._turning = False
 
     def add(self, batch: Batch) -> None:
@@ -62,8 +70,7 @@ class SpinWatch:
         What is said of a time does not change with what is added later.
         """
         found: list[tuple[float, float | None]] = []
-        for first, after in self._stalls:
-            assert first is not None  # only an end may be open
+        for first, after in ((bins.first, bins.after) for bins in self._stalls):
             start, known = first * BIN, first * BIN + MIN_STALL
             if known > until:
                 break
@@ -97,9 +104,9 @@ class SpinWatch:
             return
         usual = float(np.median(self._moving))
         self._turning |= median > TURNING * usual
-        stands = self._stalls[-1][1] is None if self._stalls else False
+        stands = bool(self._stalls) and self._stalls[-1].after is None
         if median >= STALLED * usual:
             if stands:
-                self._stalls[-1][1] = number
+                self._stalls[-1].after = number
         elif self._turning and not stands:
-            self._stalls.append([number, None])
+            self._stalls.append(_Bins(number))

@@ -12,6 +12,7 @@ from bentwing.base import geometry
 from bentwing.base.mount import FixedMount, MotorMount, Mount, Pose
 from bentwing.base.trajectory import DT
 from bentwing.odometry.continuous.slow_states import WALK, initial_std
+from bentwing.odometry.core_states import core_pose
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -131,8 +132,8 @@ def first_state(start: Start, described: Calibration) -> FilterState:
         gyro_bias=start.gyro_bias.tolist(),
         accel_bias=start.accel_bias.tolist(),
         gravity=described.gravity.tolist(),
-        base=_pair(base),
-        lidar=_pair(lidar),
+        base=core_pose(base),
+        lidar=core_pose(lidar),
         latency=described.latency,
         encoder_delay=0.0,
     )
@@ -208,7 +209,3 @@ def _mounts(mount: Mount) -> tuple[Pose, Pose]:
     if isinstance(mount, FixedMount):
         return mount.T_imu_lidar, Pose.identity()
     return mount.T_imu_motor, mount.T_motor_lidar
-
-
-def _pair(pose: Pose) -> Transform:
-    return pose.translation.tolist(), pose.quaternion.tolist()

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from bentwing.base.errors import NotEnoughDataError, PayloadError, RecordingError
 from bentwing.base.mount import FixedMount, MotorMount, Mount
 from bentwing.base.trajectory import DT
+from bentwing.odometry.buffer import HELD
 from bentwing.odometry.interface import Estimator, Snapshot
 from bentwing.odometry.kalman.beginning import described_beginning
 from bentwing.odometry.kalman.core import FilterSettings
@@ -41,8 +42,6 @@ LOOK_AHEAD = 1.5
 BEYOND = 0.02
 # Lidar data without inertial data for so long: there is no IMU, s.
 NO_IMU = 3.0
-# Batches that end within this time before the last sweep are held, s.
-HELD = 1.0
 NEEDS_IMU = (
     "the Kalman filter predicts by an IMU and there is none {where}; use --estimator continuous or "
     "--estimator ndt, which need none"

@@ -13,6 +13,7 @@ from bentwing import _core
 from bentwing.base import geometry
 from bentwing.base.mount import MotorMount, Pose
 from bentwing.base.window_record import WindowRecord
+from bentwing.odometry.health import is_degenerate
 from bentwing.odometry.kalman.core import SLOW, anchored, unlearned_delay
 from bentwing.odometry.kalman.learned import calibration_of
 from bentwing.odometry.kalman.snapshot import FilterSnapshot, joined_poses
@@ -30,9 +31,6 @@ if TYPE_CHECKING:
 
     Poses = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
 
-# A sweep is degenerate when it says so much less, as a share of all, about its translation or its
-# rotation in one direction.
-LEAST_SHARE = 5e-4
 # Fewer points are no sweep.
 MIN_POINTS = 100
 # How much less certain a second beginning is of what the first has learned from the same data.
@@ -197,7 +195,7 @@ def record_of(stop: float, n_points: int, found: _core.KalmanSweep) -> WindowRec
         registration_rmse=found.rmse if matched else None,
         iterations=found.n_iterations,
         converged=found.converged,
-        degenerate=not matched or min(shift[0], turn[0]) < LEAST_SHARE,
+        degenerate=not matched or is_degenerate(shift, turn),
         translation_eigenvalues=list(shift),
         rotation_eigenvalues=list(turn),
     )

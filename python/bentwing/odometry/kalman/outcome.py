@@ -6,6 +6,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from bentwing.base.estimate import Estimate
+from bentwing.odometry.health import FEW
 from bentwing.odometry.segments import joined
 
 if TYPE_CHECKING:
@@ -15,8 +16,6 @@ if TYPE_CHECKING:
     from bentwing.base.window_record import WindowRecord
     from bentwing.odometry.kalman.snapshot import FilterSnapshot
 
-# More of the sweeps than this are worth a sentence.
-FEW = 0.02
 # So long a weakness is, s: a lidar that turns looks elsewhere before.
 WEAK = 3.0
 # Seconds without inertial samples that are.

@@ -12,6 +12,7 @@ import numpy as np
 from bentwing.base.breaks import SCAN, Break
 from bentwing.base.errors import NotEnoughDataError
 from bentwing.base.mount import MotorMount
+from bentwing.odometry.buffer import HELD
 from bentwing.odometry.core_states import core_globals
 from bentwing.odometry.interface import Estimator, Snapshot
 from bentwing.odometry.ndt.keyframes import Keyframes
@@ -37,8 +38,6 @@ if TYPE_CHECKING:
 MIN_POINTS = 200
 # Without a registered scan for longer than this the place is lost, s.
 LOST_AFTER = 1.0
-# Batches that end within this time before the last scan are held, s.
-HELD = 1.0
 
 
 class Ndt(Estimator):
@@ -162,7 +161,7 @@ class Ndt(Estimator):
         scan, phase = Scan.of(returns, self._calibration.latency), self._phase
         if isinstance(phase, Waiting):
             refuse_plane(scan.points, "NDT odometry")
-            origin = Placed(scan.time, np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]))
+            origin = Placed(np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]), scan.time)
             self._begin(scan, origin, stop)
         else:
             self._follow(phase, scan, stop)

@@ -9,11 +9,12 @@ import numpy as np
 
 from bentwing import _core
 from bentwing.base import geometry
+from bentwing.odometry.core_states import core_pose
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from bentwing.odometry.ndt.motion import Placed
+    from bentwing.base.mount import Pose
     from bentwing.odometry.ndt.settings import NdtSettings
 
 # Least standard deviation of a surface in voxels: ground and walls are no planes.
@@ -40,21 +41,21 @@ class Keyframes:
         self._threads = threads
         self.reference = self._nothing()
         self.n_keyframes = 0
-        self._last: Placed | None = None
-        self._swept: Placed | None = None
+        self._last: Pose | None = None
+        self._swept: Pose | None = None
 
     def clear(self) -> None:
         """Forget all of them."""
         self.reference = self._nothing()
         self._last = self._swept = None
 
-    def renew(self, points: NDArray[np.float64], pose: Placed, lidar: Placed) -> None:
+    def renew(self, points: NDArray[np.float64], pose: Pose, lidar: Pose) -> None:
         """Replace the only keyframe there is by a better one; as `add`."""
         self.clear()
         self.n_keyframes -= 1
         self.add(points, pose, lidar)
 
-    def wants(self, lidar: Placed) -> bool:
+    def wants(self, lidar: Pose) -> bool:
         """Whether the lidar has moved or turned enough since the last keyframe.
 
         The turn counts as well as the distance, for the lidar of a hovering carrier sees something
@@ -63,12 +64,12 @@ class Keyframes:
         if self._last is None:
             return True
         moved = np.linalg.norm(lidar.translation - self._last.translation)
-        turn = geometry.multiply(geometry.inverse(self._last.quat_xyzw), lidar.quat_xyzw)
+        turn = geometry.multiply(geometry.inverse(self._last.quaternion), lidar.quaternion)
         turned = np.linalg.norm(geometry.log(turn))
         limits = self._settings
         return bool(moved >= limits.keyframe_distance or turned >= limits.keyframe_angle)
 
-    def add(self, points: NDArray[np.float64], pose: Placed, lidar: Placed) -> None:
+    def add(self, points: NDArray[np.float64], pose: Pose, lidar: Pose) -> None:
         """Make a scan a keyframe.
 
         Parameters
@@ -79,7 +80,7 @@ class Keyframes:
         if self._settings.reference == "last":
             self.reference = self._nothing()
         self.reference.insert(
-            points, _pair(pose), lidar=lidar.translation.tolist(), threads=self._threads
+            points, core_pose(pose), lidar=lidar.translation.tolist(), threads=self._threads
         )
         self.n_keyframes += 1
         self._last = lidar
@@ -93,7 +94,7 @@ class Keyframes:
             roughness=ROUGHNESS,
         )
 
-    def _sweep(self, lidar: Placed) -> None:
+    def _sweep(self, lidar: Pose) -> None:
         if self._swept is None:
             self._swept = lidar
         spare = SPARE * self._max_range
@@ -101,7 +102,3 @@ class Keyframes:
             self._swept = lidar
             reach = self._max_range + spare
             self.reference.keep_within(lidar.translation.tolist(), reach, threads=self._threads)
-
-
-def _pair(pose: Placed) -> tuple[list[float], list[float]]:
-    return pose.translation.tolist(), pose.quat_xyzw.tolist()

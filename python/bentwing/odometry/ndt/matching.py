@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from bentwing import _core
 from bentwing.base.errors import EstimationError
+from bentwing.odometry.core_states import core_pose
 from bentwing.odometry.ndt.motion import Placed
 
 if TYPE_CHECKING:
@@ -97,12 +98,11 @@ class Matcher:
         *,
         coarse: bool,
     ) -> _core.NdtRegistration:
-        pose = expected.translation.tolist(), expected.quat_xyzw.tolist()
         return self._timed(
             "register",
             lambda: reference.register(
                 points,
-                pose,
+                core_pose(expected),
                 rotation_sigma=ROTATION_SIGMA,
                 translation_sigma=TRANSLATION_SIGMA,
                 independence=INDEPENDENCE,
@@ -120,4 +120,4 @@ class Matcher:
 
 
 def _pose(scan: Scan, found: _core.NdtRegistration) -> Placed:
-    return Placed(scan.time, found.translation, found.quat_xyzw)
+    return Placed(found.translation, found.quat_xyzw, scan.time)

@@ -10,12 +10,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bentwing.base import geometry
+from bentwing.base.mount import Pose
 from bentwing.base.trajectory import DT, Trajectory
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-
-    from bentwing.base.mount import Pose
 
     Array = NDArray[np.float64]
 
@@ -45,32 +44,18 @@ REST = Twist(np.zeros(3), np.zeros(3))
 
 
 @dataclass(frozen=True, slots=True)
-class Placed:
-    """Pose `T_map_imu` of a scan.
-
-    Attributes
-    ----------
-    time : s
-    translation : (3,) m, map frame
-    quat_xyzw : (4,)
-    """
+class Placed(Pose):
+    """Pose `T_map_imu` of a scan at its time, s."""
 
     time: float
-    translation: Array
-    quat_xyzw: Array
-
-    def behind(self, mounted: Pose) -> Placed:
-        """Pose of what is mounted on the frame."""
-        at = geometry.compose(self.translation, self.quat_xyzw, mounted.translation)
-        return Placed(self.time, at, geometry.multiply(self.quat_xyzw, mounted.quaternion))
 
 
 def twist_between(before: Placed, after: Placed) -> Twist:
     """Return the constant twist that leads from one pose to another, in the imu frame of the later."""
     dt = after.time - before.time
-    back = geometry.inverse(after.quat_xyzw)
+    back = geometry.inverse(after.quaternion)
     v = geometry.rotate(back, after.translation - before.translation) / dt
-    turn = geometry.multiply(geometry.inverse(before.quat_xyzw), after.quat_xyzw)
+    turn = geometry.multiply(geometry.inverse(before.quaternion), after.quaternion)
     return Twist(v, geometry.log(turn) / dt)
 
 
@@ -137,7 +122,7 @@ class Track:
             return Trajectory(times, *_repeated(self.last, len(times)))
         knots = np.array([pose.time for pose in self.poses])
         p = np.array([pose.translation for pose in self.poses])
-        q = np.array([pose.quat_xyzw for pose in self.poses])
+        q = np.array([pose.quaternion for pose in self.poses])
         steps = np.diff(knots)
         turns = geometry.log(geometry.multiply(geometry.inverse(q[:-1]), q[1:]))
         v, w = _slopes(np.diff(p, axis=0), steps), _slopes(turns, steps)
@@ -151,13 +136,13 @@ class Track:
 def moved_on(pose: Placed, twist: Twist, time: float) -> Placed:
     """Return where a constant twist leads from a pose."""
     dt = time - pose.time
-    shifted = pose.translation + geometry.rotate(pose.quat_xyzw, twist.v * dt)
-    turned = geometry.multiply(pose.quat_xyzw, geometry.exp(twist.omega * dt))
-    return Placed(time, shifted, turned / np.linalg.norm(turned))
+    shifted = pose.translation + geometry.rotate(pose.quaternion, twist.v * dt)
+    turned = geometry.multiply(pose.quaternion, geometry.exp(twist.omega * dt))
+    return Placed(shifted, turned / np.linalg.norm(turned), time)
 
 
 def _repeated(pose: Placed, n: int) -> tuple[Array, Array]:
-    return np.tile(pose.translation, (n, 1)), np.tile(pose.quat_xyzw, (n, 1))
+    return np.tile(pose.translation, (n, 1)), np.tile(pose.quaternion, (n, 1))
 
 
 def _slopes(shifts: Array, steps: Array) -> Array:

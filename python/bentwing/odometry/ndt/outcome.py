@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from bentwing.base.estimate import Estimate
 from bentwing.base.trajectory import DT, Trajectory
 from bentwing.base.window_record import WindowRecord
+from bentwing.odometry.health import FEW, is_degenerate
 from bentwing.odometry.ndt.levelling import SPAN, VELOCITY_SPAN
 from bentwing.odometry.segments import joined
 
@@ -21,12 +22,6 @@ if TYPE_CHECKING:
     from bentwing.odometry.ndt.levelling import Frame, Levelling
     from bentwing.odometry.ndt.matching import Match
     from bentwing.odometry.ndt.motion import Track
-
-# A scan is degenerate when it says so much less, as a share of all, about its translation or its
-# rotation in one direction: the surfaces it sees could be shifted or turned along themselves.
-LEAST_SHARE = 5e-4
-# More of the scans than this are worth a sentence.
-FEW = 0.02
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,7 +119,7 @@ def record_of(time: float, n_surfaces: int, match: Match | None) -> WindowRecord
         registration_rmse=found.rmse,
         iterations=found.n_iterations,
         converged=found.converged,
-        degenerate=min(shift[0], turn[0]) < LEAST_SHARE,
+        degenerate=is_degenerate(shift, turn),
         translation_eigenvalues=list(shift),
         rotation_eigenvalues=list(turn),
     )

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bentwing.odometry.buffer import LidarStretch
-    from bentwing.odometry.ndt.motion import Placed, Twist
+    from bentwing.odometry.ndt.motion import Twist
 
 # Between these the motion is straight, s.
 STEP = 0.01
@@ -63,10 +63,10 @@ class Scan:
         )
         return motion.place(self.points, self.times, self.angles, head, threads=threads)
 
-    def lidar_at(self, pose: Placed, mount: Mount) -> Placed:
+    def lidar_at(self, pose: Pose, mount: Mount) -> Pose:
         """Pose of the lidar at the scan's time, given that of the IMU."""
         if isinstance(mount, FixedMount):
-            return pose.behind(mount.T_imu_lidar)
+            return pose @ mount.T_imu_lidar
         angle = mount.encoder_zero + (0.0 if self.angles is None else float(self.angles.mean()))
         turned = Pose(np.zeros(3), geometry.exp(angle * mount.axis))
-        return pose.behind(mount.T_imu_motor).behind(turned).behind(mount.T_motor_lidar)
+        return pose @ mount.T_imu_motor @ turned @ mount.T_motor_lidar

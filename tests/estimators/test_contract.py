@@ -142,6 +142,47 @@ def test_empty_batches_change_nothing(plain_run, run, head, name):
     assert all_bytes(run(name, batches=batches)) == all_bytes(plain_run(name))
 
 
+def test_steps_that_are_taken_later_give_the_same_result(plain_run, quick, head, name):
+    engine = odometry.create(name, head.payload, quick[name], 1)
+    for i, batch in enumerate(head.batches):
+        engine.take(batch)
+        if i % 7 == 0:
+            engine.advance()
+    assert all_bytes(engine.result()) == all_bytes(plain_run(name))
+
+
+def test_a_snapshot_stays_as_it_is_while_the_estimator_goes_on_behind_a_break(quick, head, name):
+    engine = odometry.create(name, head.payload, quick[name], 1)
+    batches = [b for b in head.batches if b.times[-1] < 7.0 or b.times[0] > 9.0]
+    for batch in batches:
+        if batch.times[0] > 9.0:
+            break
+        engine.feed(batch)
+    snapshot = engine.current
+    known, end = all_bytes(snapshot.estimate()), snapshot.registered.end
+    recent = snapshot.registered.recent().positions.tobytes()
+    for batch in batches:
+        if batch.times[0] > 9.0:
+            engine.feed(batch)
+    assert engine.result().trajectory.times[-1] > 10.5
+    assert engine.current.registered.end > end == snapshot.registered.end
+    assert all_bytes(snapshot.estimate()) == known
+    assert snapshot.registered.recent().positions.tobytes() == recent
+
+
+def test_the_recent_poses_are_the_end_of_the_trajectory(quick, head, name):
+    engine = odometry.create(name, head.payload, quick[name], 1)
+    for batch in head.batches:
+        if batch.times[-1] < 8.0:
+            engine.feed(batch)
+    snapshot = engine.current
+    recent, whole = snapshot.registered.recent(), snapshot.estimate().trajectory
+    assert recent.times[-1] == pytest.approx(whole.times[-1], abs=0.011)
+    inside = whole.covers(recent.times)
+    positions, _ = whole.interpolate(recent.times[inside])
+    assert recent.positions[inside] == pytest.approx(positions, abs=1e-3)
+
+
 def test_two_estimators_at_once_do_not_disturb_each_other(plain_run, quick, head, name):
     engines = [odometry.create(name, head.payload, quick[name], 1) for _ in range(2)]
     for batch in head.batches:

@@ -59,6 +59,9 @@ class Levelling:
 
     def copy(self) -> Levelling:
         """Return what is collected by now."""
+        if self._times:  # one array of many single samples, which take long to join
+            self._times = [np.concatenate(self._times)]
+            self._forces = [np.concatenate(self._forces)]
         collected = Levelling()
         collected._times, collected._forces = [*self._times], [*self._forces]
         return collected

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -93,6 +94,25 @@ def test_what_is_known_on_the_way_is_the_beginning_of_the_result(flown):
     *_, halfway, final = flown
     positions, _ = final.trajectory.interpolate(halfway.trajectory.times[:-50])
     assert np.abs(halfway.trajectory.positions[:-50] - positions).max() < 0.01
+
+
+def test_where_the_place_is_lost_a_new_map_begins(fixed):
+    """For two seconds the lidar sees what is 60 m higher; then the room is a new one."""
+    replaced = []
+    with Odometry(fixed.payload, estimator="ndt", settings=SETTINGS) as odometry:
+        for piece in fixed.pieces:
+            if isinstance(piece, LidarBatch) and 5.0 < piece.times[0] < 7.0:
+                piece = replace(piece, points=piece.points + np.array([0.0, 0.0, 60.0]))
+            odometry.feed(piece)
+            odometry.wait(60.0)
+            if (update := odometry.new_points()).replaces:
+                replaced.append(odometry.estimate().windows[-1].time)
+                assert len(update.points)
+        final = odometry.finish()
+    assert final.breaks
+    assert all(broken.sensor == "scan" for broken in final.breaks)
+    assert len(replaced) == len(final.segments) == len(final.breaks) + 1
+    assert "its place relative to what came before is a guess" in final.warnings[-1]
 
 
 def test_a_lidar_alone_is_followed_and_predicted_at_constant_velocity(fixed, all_bytes):

@@ -4,6 +4,14 @@
 from bentwing.odometry.continuous.estimator import Continuous
 from bentwing.odometry.kalman import Kalman
 from bentwing.odometry.ndt import Ndt
-from bentwing.odometry.registry import ESTIMATORS, create, require_estimator
+from bentwing.odometry.registry import ESTIMATORS, EstimatorSettings, create, require_estimator
 
-__all__ = ["ESTIMATORS", "Continuous", "Kalman", "Ndt", "create", "require_estimator"]
+__all__ = [
+    "ESTIMATORS",
+    "Continuous",
+    "EstimatorSettings",
+    "Kalman",
+    "Ndt",
+    "create",
+    "require_estimator",
+]

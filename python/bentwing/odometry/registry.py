@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 from bentwing.base.errors import UsageError
 from bentwing.odometry.continuous.estimator import Continuous
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from bentwing.odometry.interface import Estimator
 
+EstimatorSettings: TypeAlias = ContinuousSettings | KalmanSettings | NdtSettings
 ESTIMATORS: dict[str, tuple[Callable[..., Estimator], type[BaseModel]]] = {
     "continuous": (Continuous, ContinuousSettings),
     "kalman": (Kalman, KalmanSettings),
@@ -29,7 +30,7 @@ ESTIMATORS: dict[str, tuple[Callable[..., Estimator], type[BaseModel]]] = {
 def create(
     name: str,
     payload: Payload,
-    settings: BaseModel | None = None,
+    settings: EstimatorSettings | None = None,
     threads: int | None = None,
 ) -> Estimator:
     """Return an estimator.

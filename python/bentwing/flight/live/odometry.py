@@ -28,13 +28,13 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from numpy.typing import ArrayLike, NDArray
-    from pydantic import BaseModel
     from typing_extensions import Self
 
     from bentwing.base.estimate import Estimate
     from bentwing.base.trajectory import Trajectory
     from bentwing.base.window_record import WindowRecord
     from bentwing.flight.control import Stall
+    from bentwing.odometry import EstimatorSettings
     from bentwing.recording import Batch
 
 
@@ -64,7 +64,7 @@ class Odometry:
         payload: Payload | Path | str,
         *,
         estimator: str = "continuous",
-        settings: BaseModel | None = None,
+        settings: EstimatorSettings | None = None,
         threads: int | None = None,
         map_spacing: float = 0.1,
         max_map_points: int = 5_000_000,

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bentwing.base.errors import InputError
+from bentwing.base.voxels import VoxelSet, voxel_keys
 from bentwing.evaluate.alignment import Alignment
 from bentwing.evaluate.clouds import Cloud
 from bentwing.evaluate.map import surface_error
@@ -18,7 +19,6 @@ from bentwing.evaluate.statistics import SAMPLES
 from bentwing.evaluate.surface import Surface
 from bentwing.evaluate.surfels import Surfels, surfels_of_cloud, surfels_of_mesh
 from bentwing.map.read_mesh import read_mesh
-from bentwing.map.thin import VoxelSet, voxel_keys
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial import cKDTree
 
+from bentwing.base.voxels import voxel_keys
 from bentwing.evaluate.statistics import SAMPLES
-from bentwing.map.thin import voxel_keys
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

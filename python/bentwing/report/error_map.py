@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bentwing.base.atomic import atomic_path
-from bentwing.map.thin import voxel_keys
+from bentwing.base.voxels import voxel_keys
 from bentwing.report.colours import ERROR, colour
 from bentwing.report.picture import paint, project
 from bentwing.report.svg import map_view

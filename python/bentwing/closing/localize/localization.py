@@ -52,7 +52,7 @@ def find_in_map(
     Raises
     ------
     NotInMapError
-        If no place was recognized.
+        If no place was recognized, or others that are as many put it elsewhere.
     """
     chunks = project(
         batches,
@@ -72,12 +72,7 @@ def find_in_map(
     }
     placement = place_in_map(estimate, candidates, places)
     if placement is None:
-        msg = (
-            f"{prior.path}: none of the {len(places)} places of the recording was recognized among "
-            f"the {len(prior.places)} of the map; run.json says why under localization. Is it the same "
-            "site, seen from near enough, and is the map level?"
-        )
-        raise NotInMapError(msg, record)
+        raise NotInMapError(_unplaced(prior, places, candidates), record)
     record["supporters"] = placement.supporters
     record["T_map_run"] = placement.T_map_run.tolist()
     record["largest_deformation"] = placement.largest_deformation
@@ -85,11 +80,25 @@ def find_in_map(
 
 
 class NotInMapError(EstimationError):
-    """No place of the recording was recognized in the map; `record` tells what was tried."""
+    """Where the recording is in the map is unknown; `record` tells what was tried."""
 
     def __init__(self, message: str, record: dict[str, Any]) -> None:
         super().__init__(message)
         self.record = record
+
+
+def _unplaced(prior: PriorMap, places: Sequence[Place], candidates: Sequence[Candidate]) -> str:
+    n = sum(c.accepted for c in candidates)
+    if n:
+        return (
+            f"{prior.path}: {n} places of the recording contradict each other on where it is in the map, "
+            "and nothing tells which are right; record a longer part of the site"
+        )
+    return (
+        f"{prior.path}: none of the {len(places)} places of the recording was recognized among "
+        f"the {len(prior.places)} of the map; run.json says why under localization. Is it the same "
+        "site, seen from near enough, and is the map level?"
+    )
 
 
 def _described(chunks: Iterable[MapChunk], estimate: Estimate) -> list[Place]:

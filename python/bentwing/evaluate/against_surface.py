@@ -193,8 +193,7 @@ def _viewpoints(
         return np.median(reference.surfels.centres, axis=0, keepdims=True)
     positions = path.positions - cloud.origin
     _, first = np.unique(voxel_keys(positions, _VIEWPOINTS_APART), return_index=True)
-    viewpoints: NDArray[np.float64] = positions[first] @ placement.R.T + placement.t
-    return viewpoints
+    return placement.put(positions[first])
 
 
 def _completeness(cloud: Cloud, surface: Surface, placement: Alignment) -> float:
@@ -203,6 +202,6 @@ def _completeness(cloud: Cloud, surface: Surface, placement: Alignment) -> float
     seen, filled = np.zeros(len(surface.surfels), np.bool_), VoxelSet()
     for part in cloud.parts():
         # one point per voxel of half the edge reaches the same discs as all of them, nearly
-        points = part @ placement.R.T + placement.t
+        points = placement.put(part)
         seen[surface.within(points[filled.add(voxel_keys(points, edge / 2))], edge)] = True
     return float(seen.mean())

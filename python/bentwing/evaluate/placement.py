@@ -96,7 +96,7 @@ def refine(
 
 def share_near(points: NDArray[np.float64], surface: Surface, placement: Alignment) -> float:
     """Share of points within `_NEAR` of the reference."""
-    distances, _ = surface.distances(points @ placement.R.T + placement.t, _NEAR)
+    distances, _ = surface.distances(placement.put(points), _NEAR)
     return float(np.mean(np.isfinite(distances)))
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from bentwing.base.errors import EstimationError
 from bentwing.closing.localize.placement import place_in_map
-from bentwing.closing.places import PartStream, describe_parts, match_places
+from bentwing.closing.places import describe_stream, match_places
 from bentwing.map.project import project
 
 if TYPE_CHECKING:
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from bentwing.base.estimate import Estimate
     from bentwing.closing.localize.prior_map import PriorMap
     from bentwing.closing.places import Candidate, Place
-    from bentwing.map.chunk import MapChunk
     from bentwing.recording import Batch
 
 
@@ -61,7 +60,7 @@ def find_in_map(
         segments=estimate.segments,
         threads=threads,
     )
-    places = _described(chunks, estimate)
+    places = describe_stream(chunks, estimate.trajectory, estimate.spans)
     candidates = match_places(prior.places, places)
     record: dict[str, Any] = {
         "map": str(prior.path),
@@ -99,16 +98,6 @@ def _unplaced(prior: PriorMap, places: Sequence[Place], candidates: Sequence[Can
         f"the {len(prior.places)} of the map; run.json says why under localization. Is it the same "
         "site, seen from near enough, and is the map level?"
     )
-
-
-def _described(chunks: Iterable[MapChunk], estimate: Estimate) -> list[Place]:
-    """Describe the places of a stream of points, one place at a time."""
-    poses = estimate.trajectory
-    spans = estimate.segments or [(float(poses.times[0]), float(poses.times[-1]))]
-    stream, places = PartStream(poses, spans), list[Any]()
-    for chunk in chunks:
-        places += describe_parts(stream.add(chunk.points, chunk.times))
-    return [*places, *describe_parts(stream.finish())]
 
 
 def _candidate(candidate: Candidate, places: Sequence[Place]) -> dict[str, Any]:

@@ -48,6 +48,11 @@ def voxel_keys(points: NDArray[np.float64], edge: float) -> NDArray[np.int64]:
     return pack(cells_of(points, edge))
 
 
+def column_keys(points: NDArray[np.float64], edge: float) -> NDArray[np.int64]:
+    """Return keys `(N,)` that are the same for points `(N, 3)` above each other."""
+    return voxel_keys(points * np.array([1.0, 1.0, 0.0]), edge)
+
+
 def by_key(keys: NDArray[np.int64]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return the order `(N,)` that brings equal keys together, and where each of them begins in it."""
     order = np.argsort(keys, kind="stable")

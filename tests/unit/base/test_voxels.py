@@ -6,7 +6,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from bentwing.base.voxels import VoxelSet, by_key, cells_of, centres_of, pack, unpack, voxel_keys
+from bentwing.base.voxels import (
+    VoxelSet,
+    by_key,
+    cells_of,
+    centres_of,
+    column_keys,
+    pack,
+    unpack,
+    voxel_keys,
+)
 
 BOUND = 2**20
 cells = arrays(
@@ -45,6 +54,12 @@ def test_voxels_are_as_large_below_zero_as_above_it(x, edge):
 
 def test_points_on_both_sides_of_zero_are_in_different_voxels():
     assert len(np.unique(voxel_keys(np.array([[-0.1] * 3, [0.1] * 3]), 1.0))) == 2
+
+
+def test_points_above_each_other_are_in_one_column():
+    points = np.array([[-0.1, 0.2, -7.0], [-0.9, 0.9, 5.0], [0.1, 0.2, 5.0]])
+    first, second, third = column_keys(points, 1.0)
+    assert first == second != third
 
 
 @given(st.lists(st.integers(0, 5)))

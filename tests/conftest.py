@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import hypothesis
 import numpy as np
 import pytest
 from rosbags.rosbag1 import Writer as Rosbag1Writer
@@ -18,6 +19,10 @@ from rosbags.rosbag2 import Writer as Rosbag2Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from bentwing.simulate import Scenario, simulate
+
+# How long an example takes says more about what else the machine does than about the code.
+hypothesis.settings.register_profile("bentwing", deadline=None)
+hypothesis.settings.load_profile("bentwing")
 
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 

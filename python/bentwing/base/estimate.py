@@ -43,3 +43,9 @@ class Estimate:
     def warnings(self) -> list[str]:
         """Sentences for the user: health, then the breaks."""
         return [*self.health, *(b.sentence() for b in self.breaks)]
+
+    @property
+    def spans(self) -> list[tuple[float, float]]:
+        """First and last time of each stretch without a break, s; of the whole if none is named."""
+        times = self.trajectory.times
+        return self.segments or [(float(times[0]), float(times[-1]))]

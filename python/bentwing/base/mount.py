@@ -46,7 +46,7 @@ class Pose:
     @property
     def matrix(self) -> NDArray[np.float64]:
         """(4, 4) homogeneous."""
-        return transform.rigid(self.R, self.translation)
+        return transform.from_poses(self.translation, self.quaternion)
 
     def __matmul__(self, behind: Pose) -> Pose:
         """`T_a_b @ T_b_c` is `T_a_c`."""

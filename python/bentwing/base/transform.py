@@ -20,6 +20,11 @@ def rigid(R: NDArray[np.float64], t: NDArray[np.float64]) -> NDArray[np.float64]
     return T
 
 
+def from_poses(positions: NDArray[np.float64], quats: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the transforms (..., 4, 4) of positions (..., 3) and quaternions (..., 4)."""
+    return rigid(geometry.to_matrices(quats), positions)
+
+
 def upright(yaw: float, shift: NDArray[np.float64]) -> NDArray[np.float64]:
     """Turn by `yaw` (rad) about the vertical, then shift by (3,) m."""
     T = np.eye(4)

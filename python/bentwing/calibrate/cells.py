@@ -13,6 +13,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bentwing.base.moments import Moments, Planes
+from bentwing.base.voxels import by_key, voxel_keys
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -58,16 +61,6 @@ class Pairs:
         return len(self.normals)
 
 
-@dataclass(frozen=True, slots=True)
-class _Planes:
-    """Planes of cells: counts (C,), means and normals (C, 3), eigenvalues (C, 3) increasing."""
-
-    n: Array
-    means: Array
-    normals: Array
-    values: Array
-
-
 def find_pairs(points: Array, halves: NDArray[np.int64], sigma: float) -> Pairs:
     """Find the cells that are planes in both half-scans.
 
@@ -97,7 +90,9 @@ def find_pairs(points: Array, halves: NDArray[np.int64], sigma: float) -> Pairs:
     )
 
 
-def plane_probability(planes_across: Array, n: Array, size: float, sigma: float) -> Array:
+def plane_probability(
+    planes_across: Array, n: NDArray[np.int64], size: float, sigma: float
+) -> Array:
     """Return how probable it is that points with a variance across (C,) are a plane.
 
     Compared are points that scatter across by the noise of a plane with points that are anywhere
@@ -113,45 +108,39 @@ def plane_probability(planes_across: Array, n: Array, size: float, sigma: float)
 def _pairs_of(
     points: Array, halves: NDArray[np.int64], left: NDArray[np.int64], size: float, sigma: float
 ) -> Pairs:
-    keys = np.floor(points[left] / size).astype(np.int64) + 2**20
-    code = (keys[:, 0] << 42) | (keys[:, 1] << 21) | keys[:, 2]
-    order = np.argsort(code, kind="stable")
-    code = code[order]
-    fresh = np.concatenate([[True], code[1:] != code[:-1]]) if len(code) else np.zeros(0, bool)
-    cell = np.cumsum(fresh) - 1
-    index = left[order]
-    n_cells = int(cell[-1]) + 1 if len(cell) else 0
+    order, starts = by_key(voxel_keys(points[left], size))
+    index, n_cells = left[order], len(starts)
+    cell = np.repeat(np.arange(n_cells), np.diff(np.append(starts, len(order))))
     of = [
-        _planes(points[index[halves[index] == h]], cell[halves[index] == h], n_cells)
+        _moments(points[index[halves[index] == h]], cell[halves[index] == h], n_cells)
         for h in (0, 1)
     ]
-    probable = [plane_probability(p.values[:, 0], p.n, size, sigma) for p in of]
-    good = np.abs(np.einsum("ci,ci->c", of[0].normals, of[1].normals)) > MIN_COSINE
-    for planes, probability in zip(of, probable, strict=True):
-        good &= (planes.n >= MIN_POINTS) & (probability > MIN_PROBABILITY)
-        good &= planes.values[:, 1] > (MIN_WIDTH * size) ** 2
+    planes = [Planes.of(moments.covariances) for moments in of]
+    probable = [
+        plane_probability(p.variances[:, 0], moments.counts, size, sigma)
+        for p, moments in zip(planes, of, strict=True)
+    ]
+    good = np.abs(np.einsum("ci,ci->c", planes[0].normals, planes[1].normals)) > MIN_COSINE
+    for p, moments, probability in zip(planes, of, probable, strict=True):
+        good &= (moments.counts >= MIN_POINTS) & (probability > MIN_PROBABILITY)
+        good &= p.width > MIN_WIDTH * size
     number = np.cumsum(good) - 1
     taken = good[cell] if n_cells else np.zeros(0, bool)
-    both = _planes(points[index[taken]], number[cell[taken]], int(good.sum()))
+    both = _moments(points[index[taken]], number[cell[taken]], int(good.sum()))
     return Pairs(
         index[taken],
         number[cell[taken]],
-        both.normals,
+        Planes.of(both.covariances).normals,
         both.means,
         np.minimum(*probable)[good],
     )
 
 
-def _planes(points: Array, cell: NDArray[np.int64], n_cells: int) -> _Planes:
-    """Fit a plane to the points of each cell."""
-    n = np.bincount(cell, minlength=n_cells).astype(np.float64)
-    count = np.maximum(n, 1.0)
-    means = np.stack([np.bincount(cell, p, n_cells) for p in points.T], axis=1) / count[:, None]
-    centred = points - means[cell]
-    covariance = np.empty((n_cells, 3, 3))
-    for i in range(3):
-        for j in range(i, 3):
-            sums = np.bincount(cell, centred[:, i] * centred[:, j], n_cells)
-            covariance[:, i, j] = covariance[:, j, i] = sums / count
-    values, vectors = np.linalg.eigh(covariance)
-    return _Planes(n, means, np.ascontiguousarray(vectors[:, :, 0]), values)
+def _moments(points: Array, cell: NDArray[np.int64], n_cells: int) -> Moments:
+    """Return the moments of the points of each cell, which are sorted by cell; some have none."""
+    filled, starts = np.unique(cell, return_index=True)
+    found = Moments.of_groups(points, starts)
+    whole = Moments(np.zeros(n_cells, np.int64), np.zeros((n_cells, 3)), np.zeros((n_cells, 3, 3)))
+    whole.counts[filled], whole.means[filled] = found.counts, found.means
+    whole.covariances[filled] = found.covariances
+    return whole

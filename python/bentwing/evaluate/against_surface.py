@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bentwing.base.errors import InputError
+from bentwing.base.voxels import VoxelSet, voxel_keys
 from bentwing.evaluate.alignment import Alignment
 from bentwing.evaluate.clouds import Cloud
 from bentwing.evaluate.map import surface_error
@@ -18,7 +19,6 @@ from bentwing.evaluate.statistics import SAMPLES
 from bentwing.evaluate.surface import Surface
 from bentwing.evaluate.surfels import Surfels, surfels_of_cloud, surfels_of_mesh
 from bentwing.map.read_mesh import read_mesh
-from bentwing.map.thin import VoxelSet, voxel_keys
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -193,8 +193,7 @@ def _viewpoints(
         return np.median(reference.surfels.centres, axis=0, keepdims=True)
     positions = path.positions - cloud.origin
     _, first = np.unique(voxel_keys(positions, _VIEWPOINTS_APART), return_index=True)
-    viewpoints: NDArray[np.float64] = positions[first] @ placement.R.T + placement.t
-    return viewpoints
+    return placement.put(positions[first])
 
 
 def _completeness(cloud: Cloud, surface: Surface, placement: Alignment) -> float:
@@ -203,6 +202,6 @@ def _completeness(cloud: Cloud, surface: Surface, placement: Alignment) -> float
     seen, filled = np.zeros(len(surface.surfels), np.bool_), VoxelSet()
     for part in cloud.parts():
         # one point per voxel of half the edge reaches the same discs as all of them, nearly
-        points = part @ placement.R.T + placement.t
+        points = placement.put(part)
         seen[surface.within(points[filled.add(voxel_keys(points, edge / 2))], edge)] = True
     return float(seen.mean())

@@ -28,7 +28,12 @@ class Alignment:
     def apply(self, trajectory: Trajectory) -> Trajectory:
         """Move a whole trajectory."""
         turned = geometry.multiply(geometry.from_matrices(self.R), trajectory.quats_xyzw)
-        return Trajectory(trajectory.times, trajectory.positions @ self.R.T + self.t, turned)
+        return Trajectory(trajectory.times, self.put(trajectory.positions), turned)
+
+    def put(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Move points (N, 3)."""
+        moved: NDArray[np.float64] = points @ self.R.T + self.t
+        return moved
 
 
 def associate(

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bentwing.base import geometry
+from bentwing.base.voxels import column_keys
 from bentwing.evaluate.alignment import Alignment
 
 if TYPE_CHECKING:
@@ -104,8 +105,7 @@ def _lift(points: NDArray[np.float64], reference: NDArray[np.float64], cell: flo
 def _floors(
     points: NDArray[np.float64], cell: float
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    cells = np.floor(points[:, :2] / cell).astype(np.int64)
-    keys = (cells[:, 0] << 32) + cells[:, 1]
+    keys = column_keys(points, cell)
     order = np.lexsort((points[:, 2], keys))
     unique, first = np.unique(keys[order], return_index=True)
     return unique, points[order][first, 2]

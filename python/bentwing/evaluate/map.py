@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bentwing.base.moments import Moments, Planes
+from bentwing.base.voxels import centres_of, unpack, voxel_keys
 from bentwing.evaluate.robust import MAD_TO_STD
 from bentwing.evaluate.statistics import SAMPLES
-from bentwing.map.thin import voxel_keys
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -117,14 +118,18 @@ def wall_thickness(points: NDArray[np.float64], *, patch: float = 1.0, seed: int
     inside = np.ones(len(local), dtype=np.bool_)
     counts = np.diff(np.append(starts, len(local)))
     for _ in range(_PASSES):
-        mean, values, normals = _planes(local, inside, starts)
+        # no patch loses all of its points: at most one in nine is beyond three standard deviations
+        found = Moments.of_groups(local[inside], np.searchsorted(np.flatnonzero(inside), starts))
+        planes = Planes.of(found.covariances)
         offsets = np.einsum(
-            "ni,ni->n", local - np.repeat(mean, counts, 0), np.repeat(normals, counts, 0)
+            "ni,ni->n",
+            local - np.repeat(found.means, counts, 0),
+            np.repeat(planes.normals, counts, 0),
         )
-        std = np.sqrt(values[:, 0])
+        std = planes.thickness
         inside = np.abs(offsets) <= np.repeat(_CLIP * std, counts) + 1e-12
-    kept = np.add.reduceat(inside, starts, dtype=np.int64) if len(starts) else counts
-    flat = (std < _FLATTEST * patch) & (np.sqrt(values[:, 1]) > _NARROWEST * patch)
+    kept = np.add.reduceat(inside, starts, dtype=np.int64)
+    flat = (std < _FLATTEST * patch) & (planes.width > _NARROWEST * patch)
     flat &= kept > _LEAST_KEPT * counts
     if not flat.any():
         msg = f"points: no flat patch of {patch} m with {FEWEST_POINTS} points among {len(points)} points"
@@ -146,21 +151,6 @@ def _patches(
     chosen = np.flatnonzero(np.isin(keys, cubes))
     chosen = chosen[np.argsort(keys[chosen], kind="stable")]
     starts = np.searchsorted(keys[chosen], cubes)
-    centres = (np.floor(points[chosen[starts]] / patch) + 0.5) * patch
+    centres = centres_of(unpack(cubes), patch)
     sizes = np.diff(np.append(starts, len(chosen)))
     return points[chosen] - np.repeat(centres, sizes, axis=0), starts, centres
-
-
-def _planes(
-    local: NDArray[np.float64], inside: NDArray[np.bool_], starts: NDArray[np.int64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Mean (K, 3), variances along the axes (K, 3) in rising order, and normals (K, 3)."""
-    if not len(starts):
-        return np.empty((0, 3)), np.empty((0, 3)), np.empty((0, 3))
-    weight = inside[:, None].astype(np.float64)
-    n = np.add.reduceat(weight, starts)
-    mean = np.add.reduceat(local * weight, starts) / n
-    products = (local[:, :, None] * local[:, None, :]).reshape(-1, 9)
-    second = (np.add.reduceat(products * weight, starts) / n).reshape(-1, 3, 3)
-    values, vectors = np.linalg.eigh(second - mean[:, :, None] * mean[:, None, :])
-    return mean, np.maximum(values, 0.0), vectors[:, :, 0]

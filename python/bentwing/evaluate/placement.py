@@ -9,10 +9,10 @@ import numpy as np
 
 from bentwing.base import geometry
 from bentwing.base.errors import InputError
+from bentwing.base.voxels import voxel_keys
 from bentwing.evaluate.alignment import Alignment
 from bentwing.evaluate.coarse_placement import coarse_placements
 from bentwing.evaluate.robust import scale, tukey
-from bentwing.map.thin import voxel_keys
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -96,7 +96,7 @@ def refine(
 
 def share_near(points: NDArray[np.float64], surface: Surface, placement: Alignment) -> float:
     """Share of points within `_NEAR` of the reference."""
-    distances, _ = surface.distances(points @ placement.R.T + placement.t, _NEAR)
+    distances, _ = surface.distances(placement.put(points), _NEAR)
     return float(np.mean(np.isfinite(distances)))
 
 

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bentwing.base.moments import Moments, Planes
+from bentwing.base.voxels import voxel_keys
 from bentwing.evaluate.robust import MAD_TO_STD
 from bentwing.evaluate.statistics import SAMPLES
-from bentwing.map.thin import voxel_keys
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -62,9 +63,11 @@ def revisit_consistency(
     is_new_cube = np.append(True, keys[1:] != keys[:-1])
     is_new = is_new_cube | np.append(True, np.diff(times) > APART)
     starts = np.flatnonzero(is_new)
-    sizes = np.diff(np.append(starts, len(keys)))
-    means, normals, flat = _planes(points, starts, sizes, edge)
-    usable = flat & (sizes >= _FEWEST)
+    visits = Moments.of_groups(points, starts)
+    planes = Planes.of(visits.covariances)
+    means, normals = visits.means, planes.normals
+    flat = (planes.thickness < _FLATTEST * edge) & (planes.width > _NARROWEST * edge)
+    usable = flat & (visits.counts >= _FEWEST)
     # a visit and the one before it in the same cube
     later = np.flatnonzero(~is_new_cube[starts])
     later = later[usable[later] & usable[later - 1]]
@@ -76,7 +79,7 @@ def revisit_consistency(
     same = (np.abs(cosines) > _SAME_SIDE) & (np.linalg.norm(between, axis=1) < _COMMON * edge)
     if not same.any():
         return None
-    middles = np.add.reduceat(times, starts) / sizes
+    middles = np.add.reduceat(times, starts) / visits.counts
     offsets, intervals = offsets[same], (middles[later] - middles[later - 1])[same]
     lengths = np.abs(offsets)
     return Revisits(
@@ -88,21 +91,3 @@ def revisit_consistency(
         intervals,
         middles[later][same],
     )
-
-
-def _planes(
-    points: NDArray[np.float64],
-    starts: NDArray[np.int64],
-    sizes: NDArray[np.int64],
-    edge: float,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
-    """Mean, normal and flatness of each visit."""
-    n = sizes[:, None]
-    local = points - np.repeat(points[starts], sizes, axis=0)
-    mean = np.add.reduceat(local, starts) / n
-    products = (local[:, :, None] * local[:, None, :]).reshape(-1, 9)
-    second = (np.add.reduceat(products, starts) / n).reshape(-1, 3, 3)
-    values, vectors = np.linalg.eigh(second - mean[:, :, None] * mean[:, None, :])
-    widths = np.sqrt(np.maximum(values, 0.0))
-    flat = (widths[:, 0] < _FLATTEST * edge) & (widths[:, 1] > _NARROWEST * edge)
-    return points[starts] + mean, vectors[:, :, 0], flat

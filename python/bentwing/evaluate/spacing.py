@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial import cKDTree
 
+from bentwing.base.voxels import column_keys
 from bentwing.evaluate.statistics import SAMPLES
-from bentwing.map.thin import voxel_keys
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -69,14 +69,12 @@ def _in_some_columns(cloud: Cloud) -> tuple[NDArray[np.float64], bool]:
     if cloud.n_points <= _MOST:
         return np.concatenate(list(cloud.parts())), True
     # a share of the columns, not columns up to a number of points, which would avoid dense ones
-    columns = np.unique(_column(cloud.sample.points))
+    columns = np.unique(column_keys(cloud.sample.points, _BLOCK))
     n_kept = max(1, round(len(columns) * _MOST / cloud.n_points))
     kept = np.random.default_rng(0).choice(columns, n_kept, replace=False)
-    return np.concatenate([part[np.isin(_column(part), kept)] for part in cloud.parts()]), False
-
-
-def _column(points: NDArray[np.float64]) -> NDArray[np.int64]:
-    return voxel_keys(points * np.array([1.0, 1.0, 0.0]), _BLOCK)
+    return np.concatenate(
+        [part[np.isin(column_keys(part, _BLOCK), kept)] for part in cloud.parts()]
+    ), False
 
 
 def _inner(points: NDArray[np.float64]) -> NDArray[np.bool_]:

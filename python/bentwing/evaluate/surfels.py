@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing.map.moments import VoxelMoments
+from bentwing.base.moments import Planes, VoxelMoments
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -58,12 +58,11 @@ def surfels_of_cloud(parts: Iterable[NDArray[np.float64]], edge: float) -> Surfe
     voxels = VoxelMoments(edge)
     for points in parts:
         voxels.add(points)
-    counts, means, covariances = voxels.result()
-    enough = counts >= _FEWEST
-    values, vectors = np.linalg.eigh(covariances[enough])
-    sizes = np.sqrt(np.maximum(values, 0.0))
-    flat = (sizes[:, 0] < _FLATTEST * sizes[:, 1]) & (sizes[:, 1] > _NARROWEST * edge)
-    return Surfels(means[enough][flat], vectors[flat][:, :, 0].copy(), edge)
+    found = voxels.result()
+    found = found[found.counts >= _FEWEST]
+    planes = Planes.of(found.covariances)
+    flat = (planes.thickness < _FLATTEST * planes.width) & (planes.width > _NARROWEST * edge)
+    return Surfels(found.means[flat], planes.normals[flat], edge)
 
 
 def surfels_of_mesh(mesh: Mesh, origin: NDArray[np.float64], edge: float) -> Surfels:

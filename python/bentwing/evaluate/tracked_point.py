@@ -166,7 +166,7 @@ def _fit(
         measured = track.positions[covered]
         points, velocities, quats = _points(estimate, times[covered], arm)
         alignment = alignment or align(points, measured)
-        placed = points @ alignment.R.T + alignment.t
+        placed = alignment.put(points)
         residuals = placed - measured
         sizes = np.linalg.norm(residuals, axis=1)
         sigma = max(scale(sizes) / np.sqrt(3), _FINEST_SIGMA)

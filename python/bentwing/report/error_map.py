@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bentwing.base.atomic import atomic_path
-from bentwing.map.thin import voxel_keys
+from bentwing.base.voxels import column_keys, voxel_keys
 from bentwing.report.colours import ERROR, colour
 from bentwing.report.picture import paint, project
 from bentwing.report.svg import map_view
@@ -88,9 +88,7 @@ def _overhead(error: MapError) -> NDArray[np.bool_]:
     above: NDArray[np.bool_] = (
         error.points[:, 2] > np.percentile(error.viewpoints[:, 2], 95) + _HEADROOM
     )
-    flat = np.array([1.0, 1.0, 0.0])
     roofed = np.isin(
-        voxel_keys(error.viewpoints * flat, _COLUMN),
-        voxel_keys(error.points[above] * flat, _COLUMN),
+        column_keys(error.viewpoints, _COLUMN), column_keys(error.points[above], _COLUMN)
     )
     return above if roofed.mean() > _ROOFED_SHARE else none

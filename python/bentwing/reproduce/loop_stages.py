@@ -15,6 +15,7 @@ import numpy as np
 
 from bentwing.base import geometry
 from bentwing.base.trajectory import Trajectory
+from bentwing.base.transform import from_poses
 from bentwing.closing.global_registration import close_loops
 from bentwing.closing.places import MatchSettings, describe_run, link_between, match_places
 from bentwing.closing.pose_graph import Links, PoseGraph, deform_trajectory, solve
@@ -136,8 +137,7 @@ def _linked(drifted: Trajectory, places: list[Place]) -> tuple[Trajectory, int, 
     spans = np.array([place.span for place in places])
     at = spans.mean(axis=1)
     positions, quats = drifted.interpolate(at)
-    nodes = np.tile(np.eye(4), (len(at), 1, 1))
-    nodes[:, :3, :3], nodes[:, :3, 3] = geometry.to_matrices(quats), positions
+    nodes = from_poses(positions, quats)
     half = len(places) // 2  # the flight out against the flight back
     found = [
         replace(c, j=c.j + half)

@@ -126,25 +126,6 @@ def rotation(phi: Array) -> Array:
     return result
 
 
-def quats_xyzw(R: Array) -> Array:
-    """Return unit Hamilton quaternions (N, 4) of rotation matrices (N, 3, 3), with w ≥ 0."""
-    # The largest of the four squared components is found from the diagonal and divides the rest.
-    d = R[:, [0, 1, 2], [0, 1, 2]]
-    trace = d.sum(axis=1)
-    squared = np.column_stack([1 + 2 * d - trace[:, None], 1 + trace])
-    symmetric, skew = R + R.transpose(0, 2, 1), R - R.transpose(0, 2, 1)
-    products = np.empty((len(R), 4, 4))
-    products[:, :3, :3] = symmetric
-    products[:, [0, 1, 2], [0, 1, 2]] = squared[:, :3]
-    products[:, 3, :3] = np.column_stack([skew[:, 2, 1], skew[:, 0, 2], skew[:, 1, 0]])
-    products[:, :3, 3] = products[:, 3, :3]
-    products[:, 3, 3] = squared[:, 3]
-    quats = products[np.arange(len(R)), squared.argmax(axis=1)]
-    quats = quats / np.linalg.norm(quats, axis=1, keepdims=True)
-    result: Array = np.where(quats[:, 3:] < 0, -quats, quats)
-    return result
-
-
 def _into(R_b_c: Array, vectors: Array) -> Array:
     result: Array = np.einsum("nji,nj->ni", R_b_c, vectors)
     return result

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import yaml
 
+from bentwing.base import geometry
 from bentwing.base.clock import format_ns
 from bentwing.simulate.gnss import LEVER_ARM
 from bentwing.simulate.imu import ImuErrors
-from bentwing.simulate.kinematics import quats_xyzw
 from bentwing.simulate.ros import to_ns
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ def write_yaml(path: Path, content: dict[str, Any]) -> None:
 def write_poses(file: TextIO, rig: Rig, times: Array) -> None:
     """TUM lines `t x y z qx qy qz qw`: the IMU in the simulated world, at its own stamps."""
     motion = rig.imu(times)
-    for time, p, q in zip(times, motion.p, quats_xyzw(motion.R), strict=True):
+    for time, p, q in zip(times, motion.p, geometry.from_matrices(motion.R), strict=True):
         pose = " ".join(f"{value:.9f}" for value in (*p, *q))
         file.write(f"{format_ns(to_ns(float(time)))} {pose}\n")
 

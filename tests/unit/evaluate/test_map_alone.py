@@ -8,8 +8,6 @@ from bentwing.evaluate.entropy import map_entropy
 from bentwing.evaluate.revisits import revisit_consistency
 from bentwing.evaluate.spacing import point_spacing
 from bentwing.map.chunk import MapChunk
-from bentwing.map.moments import VoxelMoments
-from bentwing.map.thin import voxel_cells, voxel_keys
 from bentwing.map.writer import open_map
 
 
@@ -95,25 +93,3 @@ def test_two_faces_of_a_thin_wall_are_not_taken_for_one():
     points = np.vstack([wall(n, at=0.01), wall(n, at=0.45)])
     times = np.concatenate([rng.uniform(0, 5, n), rng.uniform(60, 65, n)])
     assert revisit_consistency(points, times) is None
-
-
-def test_moments_of_voxels_are_those_of_their_points():
-    rng = np.random.default_rng(0)
-    points = rng.uniform(-3, 3, (20_000, 3))
-    voxels = VoxelMoments(1.0)
-    for part in np.array_split(points, 9):
-        voxels.add(part)
-    counts, means, covariances = voxels.result()
-    keys = voxel_keys(points, 1.0)
-    assert counts.sum() == len(points)
-    for i, key in enumerate(np.unique(keys)):
-        own = points[keys == key]
-        assert counts[i] == len(own)
-        assert np.allclose(means[i], own.mean(axis=0))
-        assert np.allclose(covariances[i], np.cov(own.T, bias=True))
-
-
-def test_cells_come_back_from_their_keys():
-    points = np.random.default_rng(0).uniform(-500, 500, (1_000, 3))
-    cells = voxel_cells(voxel_keys(points, 0.5))
-    assert np.array_equal(cells, np.floor(points / 0.5).astype(np.int64))

@@ -1,13 +1,11 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-import tracemalloc
-
 import numpy as np
 import pytest
 
 from bentwing.base.errors import UsageError
 from bentwing.map.chunk import MapChunk
 from bentwing.map.sample import MapSample
-from bentwing.map.thin import VoxelSet, thin
+from bentwing.map.thin import thin
 
 
 def chunks(points, n_chunks=10):
@@ -34,29 +32,6 @@ def test_spacing_zero_keeps_all_points():
 def test_an_impossible_spacing_is_refused_before_the_work(spacing):
     with pytest.raises(UsageError, match="map spacing"):
         thin([], spacing)
-
-
-def test_the_set_agrees_with_a_set_of_python():
-    rng, reference, ours = np.random.default_rng(1), set(), VoxelSet()
-    for _ in range(200):
-        keys = rng.integers(0, 5000, rng.integers(0, 200))
-        expected = []
-        for key in keys.tolist():
-            expected.append(key not in reference)
-            reference.add(key)
-        assert ours.add(keys).tolist() == expected
-    assert len(ours) == len(reference)
-
-
-def test_a_million_voxels_cost_a_few_bytes_each():
-    ours, n = VoxelSet(), 1_000_000
-    tracemalloc.start()
-    for start in range(0, n, 100_000):
-        ours.add(np.arange(start, start + 100_000) * 7919)
-    peak = tracemalloc.get_traced_memory()[1]
-    tracemalloc.stop()
-    # 50 million voxels at this rate stay below 2 GB
-    assert peak < 40 * n
 
 
 def test_the_sample_is_even_and_bounded():

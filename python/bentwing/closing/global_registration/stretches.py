@@ -49,8 +49,7 @@ class Inertial:
 def segments_of(estimate: Estimate) -> list[Trajectory]:
     """Return the stretches of the trajectory without a break that are long enough to be moved."""
     whole = estimate.trajectory
-    spans = estimate.segments or [(float(whole.times[0]), float(whole.times[-1]))]
-    cut = [whole.within([span]) for span in spans]
+    cut = [whole.within([span]) for span in estimate.spans]
     return [t for t in cut if len(t.times) > 1]
 
 
@@ -101,35 +100,8 @@ class Collector:
         range_sigma: float,
         threads: int,
     ) -> None:
-        self._maker = _Maker(estimate, length, settings, range_sigma, threads)
-        self._inertial: list[ImuBatch] = []
-
-    def add(self, batch: Batch) -> None:
-        """Take the next batch of the recording."""
-        if isinstance(batch, ImuBatch):
-            self._inertial.append(batch)
-        elif isinstance(batch, LidarBatch) and len(batch.times):
-            self._maker.add(batch)
-
-    def result(self) -> tuple[list[Stretches], Inertial]:
-        """Finish with what was added."""
-        self._maker.finish()
-        return self._maker.found, _joined(self._inertial)
-
-
-class _Maker:
-    """Cuts the points into stretches of a length and turns each into surfels."""
-
-    def __init__(
-        self,
-        estimate: Estimate,
-        length: float,
-        settings: SurfelSettings,
-        range_sigma: float,
-        threads: int,
-    ) -> None:
         segments = segments_of(estimate)
-        self.found = [Stretches(t) for t in segments]
+        self._found = [Stretches(t) for t in segments]
         self._samples = [core_samples(t) for t in segments]
         self._slow = core_globals(estimate.calibration)
         self._latency = estimate.calibration.latency
@@ -137,26 +109,39 @@ class _Maker:
         self._range_sigma = range_sigma
         self._number = 0
         self._held: list[LidarBatch] = []
+        self._inertial: list[ImuBatch] = []
 
-    def add(self, batch: LidarBatch) -> None:
-        """Take the next points; those outside the segments are passed over."""
+    def add(self, batch: Batch) -> None:
+        """Take the next batch of the recording."""
+        if isinstance(batch, ImuBatch):
+            self._inertial.append(batch)
+        elif isinstance(batch, LidarBatch) and len(batch.times):
+            self._cut(batch)
+
+    def result(self) -> tuple[list[Stretches], Inertial]:
+        """Finish with what was added."""
+        self._extract()
+        return self._found, _joined(self._inertial)
+
+    def _cut(self, batch: LidarBatch) -> None:
+        """Divide points by stretches; those outside the segments are passed over."""
         times = batch.times - self._latency
-        while self._number < len(self.found):
-            span = self.found[self._number].trajectory.times
+        while self._number < len(self._found):
+            span = self._found[self._number].trajectory.times
             inside = (times >= span[0]) & (times <= span[-1])
             if inside.any():
                 self._hold(batch if inside.all() else batch.where(inside))
             if times[-1] <= span[-1]:
                 return
-            self.finish()
+            self._extract()
             self._number += 1
 
     def _hold(self, batch: LidarBatch) -> None:
         self._held.append(batch)
         if batch.times[-1] - self._held[0].times[0] >= self._length:
-            self.finish()
+            self._extract()
 
-    def finish(self) -> None:
+    def _extract(self) -> None:
         """Make the surfels of what is held."""
         if not self._held:
             return
@@ -172,7 +157,7 @@ class _Maker:
             range_sigma=self._range_sigma,
             threads=self._threads,
         )
-        self.found[self._number].surfels.append(surfels)
+        self._found[self._number].surfels.append(surfels)
 
 
 def _joined(batches: list[ImuBatch]) -> Inertial:

@@ -12,14 +12,12 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from bentwing.base.transform import apply, inverse
+from bentwing.closing.agreement import Sighting, largest_group
 from bentwing.closing.joining.survey import middle_of
 from bentwing.closing.places import MatchSettings, match_places
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
-
-    from numpy.typing import NDArray
 
     from bentwing.base.progress import Stage
     from bentwing.closing.joining.survey import Survey
@@ -29,12 +27,6 @@ if TYPE_CHECKING:
 # the places around it, and a verification takes a third of a second.
 _TRIED = 64
 _FEWEST_CANDIDATES = 2
-# Matches of two parts contradict each other if they put a place farther apart than this, m, and in
-# proportion to the time between them, m/s, in which both parts may have drifted.
-_APART = 0.4
-_DRIFT = 0.005
-_TURNED = np.radians(2.0)
-_TURN_DRIFT = np.radians(0.02)
 
 
 class Part(NamedTuple):
@@ -116,26 +108,24 @@ def _between(a: Part, b: Part, of_a: Sequence[Place], of_b: Sequence[Place]) -> 
 def consistent(matches: Sequence[Match]) -> list[Match]:
     """Reject the matches of two parts that contradict the largest group that agrees.
 
-    A match is compared by where it puts the place of another one (Mangelson et al. 2018, pairwise
-    consistency). Where two equally large groups contradict each other neither is believed, nor is a
-    match that nothing else speaks for if it is not sure by itself.
+    Where two equally large groups contradict each other neither is believed, nor is a match that
+    nothing else speaks for if it is not sure by itself.
     """
     believed = [k for k, m in enumerate(matches) if m.believed]
     if not believed:
         return list(matches)
-    agree = np.array([[_agree(matches[p], matches[q]) for q in believed] for p in believed])
-    kept = _largest_group(agree)
-    rivals = np.flatnonzero(~kept)
+    group = largest_group([_sighting(matches[k]) for k in believed])
+    kept = group.members
     result = list(matches)
-    if len(rivals) and _largest_group(agree[np.ix_(rivals, rivals)]).sum() >= kept.sum():
+    if group.contested:
         for k in believed:
             result[k] = matches[k].rejected(
                 "contradicts another match of these two, and nothing tells which one is right"
             )
         return result
-    for row in rivals:
+    for row in np.flatnonzero(~kept):
         k = believed[row]
-        n_against = int((kept & ~agree[row]).sum())
+        n_against = int((kept & ~group.agree[row]).sum())
         result[k] = matches[k].rejected(
             f"contradicts {n_against} of the {int(kept.sum())} matches of these two that agree"
         )
@@ -143,6 +133,11 @@ def consistent(matches: Sequence[Match]) -> list[Match]:
         lone = believed[int(np.argmax(kept))]
         result[lone] = _alone(matches[lone])
     return result
+
+
+def _sighting(match: Match) -> Sighting:
+    a, b = match.place_a, match.place_b
+    return Sighting(match.alignment.T_a_b, b.centre, middle_of(a), middle_of(b))
 
 
 def _alone(match: Match) -> Match:
@@ -153,32 +148,6 @@ def _alone(match: Match) -> Match:
     return match.rejected(
         f"agreement is {agreement.agreement:.3g}, too little for the only match of these two"
     )
-
-
-def _agree(p: Match, q: Match) -> bool:
-    """Whether two matches may both be true."""
-    elapsed = abs(middle_of(p.place_a) - middle_of(q.place_a)) + abs(
-        middle_of(p.place_b) - middle_of(q.place_b)
-    )
-    T_p, T_q = p.alignment.T_a_b, q.alignment.T_a_b
-    centres = np.stack([p.place_b.centre, q.place_b.centre])
-    shifts = np.linalg.norm(apply(T_p, centres) - apply(T_q, centres), axis=1)
-    turn = np.arccos(np.clip((np.trace((inverse(T_p) @ T_q)[:3, :3]) - 1) / 2, -1.0, 1.0))
-    near = float(shifts.min()) <= _APART + _DRIFT * elapsed
-    return bool(near and turn <= _TURNED + _TURN_DRIFT * elapsed)
-
-
-def _largest_group(agree: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Members (M,) of a large group in which all agree, grown from the best supported one."""
-    kept = np.zeros(len(agree), dtype=np.bool_)
-    candidates = np.ones(len(agree), dtype=np.bool_)
-    while candidates.any():
-        support = (agree & candidates).sum(axis=1)
-        best = int(np.argmax(np.where(candidates, support, -1)))
-        kept[best] = True
-        candidates &= agree[best]
-        candidates[best] = False
-    return kept
 
 
 def connected(parts: Iterable[Part], matches: Iterable[Match]) -> list[list[Part]]:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bentwing.base import geometry
-from bentwing.base.transform import inverse
+from bentwing.base.transform import from_poses, inverse
 from bentwing.closing.joining.matches import Match, Part, connected
 from bentwing.closing.joining.survey import middle_of
 from bentwing.closing.places import link_between
@@ -169,9 +169,9 @@ class _Graph:
         self._poses: list[NDArray[np.float64]] = []
         for part, trajectory in trajectories.items():
             positions, quats = trajectory.interpolate(self.times[part])
-            for k, (p, q) in enumerate(zip(positions, quats, strict=True)):
+            for k, T in enumerate(from_poses(positions, quats)):
                 self.nodes[part, k] = len(self._poses)
-                self._poses.append(_matrix(p, q))
+                self._poses.append(T)
 
     def links(self, matches: Sequence[Match]) -> tuple[Links, Nodes]:
         """Return the trusted links within parts and runs, and behind them those of the matches."""
@@ -195,7 +195,7 @@ class _Graph:
             i, j = self._node_of(match.a, match.place_a), self._node_of(match.b, match.place_b)
             link = link_between(self._poses[i], self._poses[j], match.alignment)
             ends.append((i, j))
-            poses.append(_matrix(link.position, link.quat_xyzw))
+            poses.append(from_poses(link.position, link.quat_xyzw))
             information.append(link.information)
         shape = np.array(poses).reshape(-1, 4, 4)
         links = Links(
@@ -271,11 +271,11 @@ def _contradiction(links: Links, row: int, found: Solution) -> str | None:
     a centimetre off, which is true all the same.
     """
     i, j = links.nodes[row]
-    T_i, T_j = (_matrix(found.positions[k], found.quats_xyzw[k]) for k in (i, j))
-    measured = _matrix(links.positions[row], links.quats_xyzw[row])
+    T_i, T_j = from_poses(found.positions[[i, j]], found.quats_xyzw[[i, j]])
+    measured = from_poses(links.positions[row], links.quats_xyzw[row])
     off = inverse(measured) @ inverse(T_i) @ T_j
     shift = float(np.linalg.norm(off[:3, 3]))
-    turn = float(np.arccos(np.clip((np.trace(off[:3, :3]) - 1) / 2, -1.0, 1.0)))
+    turn = float(np.linalg.norm(geometry.log(geometry.from_matrices(off[:3, :3]))))
     if shift < _FALSE_SHIFT and turn < _FALSE_TURN:
         return None
     return f"contradicts the other matches by {shift:.2f} m and {np.degrees(turn):.1f}°"
@@ -285,12 +285,6 @@ def _strength(match: Match) -> float:
     """Order matches by how much speaks for them."""
     agreement = match.candidate.agreement
     return 0.0 if agreement is None else agreement.agreement * agreement.overlap
-
-
-def _matrix(position: NDArray[np.float64], quat: NDArray[np.float64]) -> NDArray[np.float64]:
-    T = np.eye(4)
-    T[:3, :3], T[:3, 3] = geometry.to_matrices(quat), position
-    return T
 
 
 def _information(turn: float, shift: float) -> NDArray[np.float64]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bentwing.closing.global_registration import Collector, GlobalSettings, Recorded
-from bentwing.closing.places import PartStream, describe_parts
+from bentwing.closing.places import describe_stream
 from bentwing.map.project import project
 
 if TYPE_CHECKING:
@@ -70,16 +70,14 @@ def survey(
             yield batch
 
     whole = estimate.trajectory
-    spans = estimate.segments or [(float(whole.times[0]), float(whole.times[-1]))]
-    stream = PartStream(whole, spans)
-    places: list[Place] = []
     chunks = project(
         collected(), whole, estimate.calibration, segments=estimate.segments, threads=threads
     )
-    for chunk in chunks:
-        places += describe_parts(stream.add(chunk.points, chunk.times))
-    places += describe_parts(stream.finish())
-    places = [place for place in places if len(place.surfels) and len(place.keypoints)]
+    places = [
+        place
+        for place in describe_stream(chunks, whole, estimate.spans)
+        if len(place.surfels) and len(place.keypoints)
+    ]
     segments, inertial = collector.result()
     starts = [float(s.trajectory.times[0]) for s in segments]
     middles = [middle_of(place) for place in places]

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial import cKDTree
 
+from bentwing.base.voxels import VoxelSet, pack, unpack, voxel_keys
 from bentwing.closing.places import FreeSpace, positions_at, seen_through
-from bentwing.map.thin import VoxelSet, voxel_cells, voxel_keys
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -46,8 +46,8 @@ class Filled:
 
     def add(self, points: NDArray[np.float64]) -> None:
         """Add points (N, 3) m, map frame."""
-        around = voxel_cells(np.unique(voxel_keys(points, _VOXEL)))[:, None, :] + _AROUND
-        self._voxels.add(voxel_keys((around.reshape(-1, 3) + 0.5) * _VOXEL, _VOXEL))
+        around = unpack(np.unique(voxel_keys(points, _VOXEL)))[:, None, :] + _AROUND
+        self._voxels.add(pack(around.reshape(-1, 3)))
 
     def has(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Whether each of points (N, 3) is in or beside a voxel that holds points."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from bentwing.base.errors import EstimationError
 from bentwing.closing.localize.placement import place_in_map
-from bentwing.closing.places import PartStream, describe_parts, match_places
+from bentwing.closing.places import describe_stream, match_places
 from bentwing.map.project import project
 
 if TYPE_CHECKING:
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from bentwing.base.estimate import Estimate
     from bentwing.closing.localize.prior_map import PriorMap
     from bentwing.closing.places import Candidate, Place
-    from bentwing.map.chunk import MapChunk
     from bentwing.recording import Batch
 
 
@@ -52,7 +51,7 @@ def find_in_map(
     Raises
     ------
     NotInMapError
-        If no place was recognized.
+        If no place was recognized, or others that are as many put it elsewhere.
     """
     chunks = project(
         batches,
@@ -61,7 +60,7 @@ def find_in_map(
         segments=estimate.segments,
         threads=threads,
     )
-    places = _described(chunks, estimate)
+    places = describe_stream(chunks, estimate.trajectory, estimate.spans)
     candidates = match_places(prior.places, places)
     record: dict[str, Any] = {
         "map": str(prior.path),
@@ -72,12 +71,7 @@ def find_in_map(
     }
     placement = place_in_map(estimate, candidates, places)
     if placement is None:
-        msg = (
-            f"{prior.path}: none of the {len(places)} places of the recording was recognized among "
-            f"the {len(prior.places)} of the map; run.json says why under localization. Is it the same "
-            "site, seen from near enough, and is the map level?"
-        )
-        raise NotInMapError(msg, record)
+        raise NotInMapError(_unplaced(prior, places, candidates), record)
     record["supporters"] = placement.supporters
     record["T_map_run"] = placement.T_map_run.tolist()
     record["largest_deformation"] = placement.largest_deformation
@@ -85,21 +79,25 @@ def find_in_map(
 
 
 class NotInMapError(EstimationError):
-    """No place of the recording was recognized in the map; `record` tells what was tried."""
+    """Where the recording is in the map is unknown; `record` tells what was tried."""
 
     def __init__(self, message: str, record: dict[str, Any]) -> None:
         super().__init__(message)
         self.record = record
 
 
-def _described(chunks: Iterable[MapChunk], estimate: Estimate) -> list[Place]:
-    """Describe the places of a stream of points, one place at a time."""
-    poses = estimate.trajectory
-    spans = estimate.segments or [(float(poses.times[0]), float(poses.times[-1]))]
-    stream, places = PartStream(poses, spans), list[Any]()
-    for chunk in chunks:
-        places += describe_parts(stream.add(chunk.points, chunk.times))
-    return [*places, *describe_parts(stream.finish())]
+def _unplaced(prior: PriorMap, places: Sequence[Place], candidates: Sequence[Candidate]) -> str:
+    n = sum(c.accepted for c in candidates)
+    if n:
+        return (
+            f"{prior.path}: {n} places of the recording contradict each other on where it is in the map, "
+            "and nothing tells which are right; record a longer part of the site"
+        )
+    return (
+        f"{prior.path}: none of the {len(places)} places of the recording was recognized among "
+        f"the {len(prior.places)} of the map; run.json says why under localization. Is it the same "
+        "site, seen from near enough, and is the map level?"
+    )
 
 
 def _candidate(candidate: Candidate, places: Sequence[Place]) -> dict[str, Any]:

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bentwing import _core
+from bentwing.base.moments import Moments, Planes, VoxelMoments
 from bentwing.closing.global_registration import STAMP
-from bentwing.map.moments import VoxelMoments
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -90,10 +90,10 @@ class SurfelMaker:
             found = finest.result()
             if size > self._settings.voxel_size:
                 coarse = VoxelMoments(size)
-                coarse.add_moments(*found)
+                coarse.add_moments(found)
                 found = coarse.result()
             side = _SIDES[number] if number < len(_SIDES) else None
-            parts.append(self._surfels(*found, size, side))
+            parts.append(self._surfels(found, size, side))
         means, covariances, normals = (
             np.concatenate(column) for column in zip(*parts, strict=True)
         )
@@ -101,22 +101,21 @@ class SurfelMaker:
 
     def _surfels(
         self,
-        counts: NDArray[np.int64],
-        means: NDArray[np.float64],
-        covariances: NDArray[np.float64],
+        found: Moments,
         size: float,
         side: NDArray[np.float64] | None,
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        values, vectors = np.linalg.eigh(covariances)
-        least, middle, most = values.T
+        planes = Planes.of(found.covariances)
+        _, middle, most = planes.variances.T
         s = self._settings
         good = (
-            (counts >= _MIN_POINTS)
-            & (2 * (middle - least) > s.min_planarity * np.maximum(least + middle + most, 1e-12))
+            (found.counts >= _MIN_POINTS)
+            & (planes.planarity > s.min_planarity)
             & (middle > s.min_width_ratio * most)
-            & (middle > (s.min_width * size) ** 2)
+            & (planes.width > s.min_width * size)
         )
-        means, covariances, normals = means[good], covariances[good], vectors[good, :, 0]
+        means, covariances = found.means[good], found.covariances[good]
+        normals = planes.normals[good]
         if side is None:
             towards = away = np.ones(len(means), dtype=np.bool_)
         else:

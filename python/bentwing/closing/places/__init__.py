@@ -18,7 +18,7 @@ from bentwing.closing.places.part import Part
 from bentwing.closing.places.place import Place, make_place
 from bentwing.closing.places.refine import Alignment
 from bentwing.closing.places.settings import MatchSettings, PlaceSettings
-from bentwing.closing.places.stream import PartStream
+from bentwing.closing.places.stream import PartStream, describe_stream
 from bentwing.closing.places.verify import Agreement
 
 __all__ = [
@@ -38,6 +38,7 @@ __all__ = [
     "default_metric",
     "describe_parts",
     "describe_run",
+    "describe_stream",
     "learn_metric",
     "link_between",
     "make_place",

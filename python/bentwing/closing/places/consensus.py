@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial.distance import cdist
 
-from bentwing.base.transform import upright
+from bentwing.base.transform import apply, upright
 from bentwing.closing.places.gestalt import opposite
 
 if TYPE_CHECKING:
@@ -153,7 +153,7 @@ def _refined(matches: _Matches, yaw: float, shift: NDArray[np.float64]) -> Hypot
     """Least squares over the matches in agreement."""
     T = upright(yaw, shift)
     for _ in range(3):
-        moved = matches.points_b @ T[:3, :3].T + T[:3, 3]
+        moved = apply(T, matches.points_b)
         near = np.linalg.norm(moved - matches.points_a, axis=1) < _NEAR
         a, b = matches.points_a[near], matches.points_b[near]
         if len(a) < 2:
@@ -165,7 +165,7 @@ def _refined(matches: _Matches, yaw: float, shift: NDArray[np.float64]) -> Hypot
             (db[:, 0] * da[:, 0] + db[:, 1] * da[:, 1]).sum(),
         )
         T = upright(float(yaw), a0 - upright(float(yaw), np.zeros(3))[:3, :3] @ b0)
-    moved = matches.points_b @ T[:3, :3].T + T[:3, 3]
+    moved = apply(T, matches.points_b)
     near = np.linalg.norm(moved - matches.points_a, axis=1) < _NEAR
     return Hypothesis(T, len(set(matches.rows[near].tolist())))
 

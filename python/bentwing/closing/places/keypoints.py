@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial import cKDTree
 
-from bentwing.closing.places.cloud import moments_to_surfels
+from bentwing.closing.places.cloud import surfels_from
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -68,7 +68,7 @@ def frames_at(tree: cKDTree, points: NDArray[np.float64]) -> Keypoints:
     near = cloud[indices]
     centred = np.where(there, near - (near * there).sum(axis=1, keepdims=True) / counts[:, None], 0)
     covariances = np.einsum("nki,nkj->nij", centred, centred) / counts[:, :, None]
-    local = moments_to_surfels(points, covariances)
+    local = surfels_from(points, covariances)
     slant = np.hypot(local.normals[:, 0], local.normals[:, 1])
     good = (
         (counts[:, 0] >= _MIN_NEIGHBOURS)

@@ -7,16 +7,29 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing.closing.places.cut import PAUSE, place_starts, positions_at
+from bentwing.closing.places.cut import PAUSE, describe_parts, place_starts, positions_at
 from bentwing.closing.places.part import MIN_POINTS, Part
 from bentwing.closing.places.settings import PlaceSettings
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from numpy.typing import NDArray
 
     from bentwing.base.trajectory import Trajectory
+    from bentwing.closing.places.place import Place
+    from bentwing.map.chunk import MapChunk
+
+
+def describe_stream(
+    chunks: Iterable[MapChunk], trajectory: Trajectory, spans: Sequence[tuple[float, float]]
+) -> list[Place]:
+    """Describe the places of a stream of points, one place at a time; parameters as of `PartStream`."""
+    stream = PartStream(trajectory, spans)
+    places: list[Place] = []
+    for chunk in chunks:
+        places += describe_parts(stream.add(chunk.points, chunk.times))
+    return [*places, *describe_parts(stream.finish())]
 
 
 class PartStream:

@@ -11,6 +11,7 @@ import numpy as np
 from bentwing import _core
 from bentwing.base import geometry
 from bentwing.base.trajectory import DT
+from bentwing.base.transform import from_poses
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -48,10 +49,7 @@ class StampedPose:
     @property
     def T_map_imu(self) -> NDArray[np.float64]:
         """(4, 4) float64, homogeneous."""
-        matrix = np.eye(4)
-        matrix[:3, :3] = geometry.to_matrices(self.quat_xyzw)
-        matrix[:3, 3] = self.position
-        return matrix
+        return from_poses(self.position, self.quat_xyzw)
 
 
 class Prediction:

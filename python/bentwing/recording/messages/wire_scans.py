@@ -13,6 +13,8 @@ from bentwing.recording.messages.wire import align, broken_if_malformed, header
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    _Geometry = tuple[float, float, float, float, float, float]
+
 
 class RawScan(NamedTuple):
     """LaserScan, or the first valid echo of a MultiEchoLaserScan; ranges (B,) float32."""
@@ -28,6 +30,16 @@ class RawScan(NamedTuple):
     intensities: NDArray[np.float32] | None
 
 
+def _head(raw: bytes, *, cdr: bool) -> tuple[int, _Geometry, int, str]:
+    """Return the stamp, ns, what `RawScan` has from `angle_min` to `range_max`, the position after it, and the order of bytes."""
+    stamp, position, order = header(raw, cdr=cdr)
+    position = align(position, 4, cdr=cdr)
+    angle_min, _, *rest = struct.unpack_from(f"{order}7f", raw, position)
+    increment, time_increment, scan_time, range_min, range_max = rest
+    geometry = (angle_min, increment, time_increment, scan_time, range_min, range_max)
+    return stamp, geometry, position + 28, order
+
+
 def _floats(raw: bytes, position: int, order: str, *, cdr: bool) -> tuple[NDArray[np.float32], int]:
     """Return a float32[] and the position after it."""
     position = align(position, 4, cdr=cdr)
@@ -39,23 +51,11 @@ def _floats(raw: bytes, position: int, order: str, *, cdr: bool) -> tuple[NDArra
 @broken_if_malformed
 def laser_scan(raw: bytes, *, cdr: bool) -> RawScan:
     """Read a sensor_msgs/LaserScan."""
-    stamp, position, order = header(raw, cdr=cdr)
-    position = align(position, 4, cdr=cdr)
-    head = struct.unpack_from(f"{order}7f", raw, position)
-    ranges, position = _floats(raw, position + 28, order, cdr=cdr)
+    stamp, geometry, position, order = _head(raw, cdr=cdr)
+    ranges, position = _floats(raw, position, order, cdr=cdr)
     intensities, _ = _floats(raw, position, order, cdr=cdr)
-    angle_min, _, increment, time_increment, scan_time, range_min, range_max = head
-    return RawScan(
-        stamp,
-        angle_min,
-        increment,
-        time_increment,
-        scan_time,
-        range_min,
-        range_max,
-        ranges,
-        intensities if len(intensities) == len(ranges) else None,
-    )
+    found = intensities if len(intensities) == len(ranges) else None
+    return RawScan(stamp, *geometry, ranges, found)
 
 
 @broken_if_malformed
@@ -64,30 +64,17 @@ def multi_echo_scan(raw: bytes, *, cdr: bool) -> RawScan:
 
     The first echo is the nearest; later ones come from behind foliage, edges or glass.
     """
-    stamp, position, order = header(raw, cdr=cdr)
-    position = align(position, 4, cdr=cdr)
-    head = struct.unpack_from(f"{order}7f", raw, position)
-    angle_min, _, increment, time_increment, scan_time, range_min, range_max = head
-    beams, position = _echoes(raw, position + 28, order, cdr=cdr)
+    stamp, geometry, position, order = _head(raw, cdr=cdr)
+    beams, position = _echoes(raw, position, order, cdr=cdr)
     strengths, _ = _echoes(raw, position, order, cdr=cdr)
-    chosen = [_first_within(echoes, range_min, range_max) for echoes in beams]
+    chosen = [_first_within(echoes, *geometry[-2:]) for echoes in beams]
     ranges = [echoes[i] if len(echoes) else np.nan for echoes, i in zip(beams, chosen, strict=True)]
     intensities = None
     if [len(s) for s in strengths] == [len(b) for b in beams]:
         intensities = np.array(
             [s[i] if len(s) else 0.0 for s, i in zip(strengths, chosen, strict=True)], np.float32
         )
-    return RawScan(
-        stamp,
-        angle_min,
-        increment,
-        time_increment,
-        scan_time,
-        range_min,
-        range_max,
-        np.array(ranges, np.float32),
-        intensities,
-    )
+    return RawScan(stamp, *geometry, np.array(ranges, np.float32), intensities)
 
 
 def _echoes(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing.map.thin import VoxelSet, voxel_keys
+from bentwing.base.voxels import VoxelSet, voxel_keys
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

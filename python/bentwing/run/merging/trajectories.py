@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bentwing.base import geometry
+from bentwing.base.transform import rigid
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -56,7 +57,6 @@ def _rigid(before: Estimate, after: Estimate) -> list[list[float]]:
     positions, quats = new.interpolate(np.clip(old.times, new.times[0], new.times[-1]))
     turns = geometry.multiply(quats, geometry.inverse(old.quats_xyzw))
     R = geometry.to_matrices(geometry.mean_rotation(turns))
-    T = np.eye(4)
-    T[:3, :3] = R
-    T[:3, 3] = positions.mean(axis=0) - R @ old.positions.mean(axis=0)
-    return T.tolist()
+    shift = positions.mean(axis=0) - R @ old.positions.mean(axis=0)
+    T: list[list[float]] = rigid(R, shift).tolist()
+    return T

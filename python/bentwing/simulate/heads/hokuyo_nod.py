@@ -14,6 +14,7 @@ import numpy as np
 from bentwing.simulate.heads.joints import Mount, Turn
 from bentwing.simulate.heads.rates import ornstein_uhlenbeck
 from bentwing.simulate.lidars.hokuyo import Hokuyo
+from bentwing.simulate.lidars.interface import described_lidar
 from bentwing.simulate.rig import Head
 from bentwing.simulate.scenes.mesh import Mesh, box, merge
 from bentwing.simulate.splines import Spline
@@ -40,13 +41,7 @@ def hokuyo_nod(rng: np.random.Generator, drive: Array, max_range: float) -> Head
         airframe=_person(),
         lidar=lidar,
         payload={
-            "lidar": {
-                "topic": lidar.topic,
-                "kind": "hokuyo-utm30lx",
-                "min_range": 0.15,
-                "max_range": max_range,
-                "range_sigma": lidar.noise,
-            },
+            "lidar": described_lidar(lidar, "hokuyo-utm30lx", min_range=0.15),
             "T_imu_lidar": nominal.as_dict(),
             "self_hits": [SELF_HITS],
         },

@@ -14,6 +14,7 @@ import numpy as np
 from bentwing.simulate.heads.airframe import quadrotor
 from bentwing.simulate.heads.joints import Mount, Turn
 from bentwing.simulate.lidars.hokuyo import Hokuyo
+from bentwing.simulate.lidars.interface import described_lidar
 from bentwing.simulate.rig import Head
 
 if TYPE_CHECKING:
@@ -37,13 +38,7 @@ def hokuyo_spin(rng: np.random.Generator, spin: Spline, max_range: float) -> Hea
         airframe=quadrotor(),
         lidar=lidar,
         payload={
-            "lidar": {
-                "topic": lidar.topic,
-                "kind": "hokuyo-utm30lx",
-                "min_range": 0.3,
-                "max_range": max_range,
-                "range_sigma": lidar.noise,
-            },
+            "lidar": described_lidar(lidar, "hokuyo-utm30lx", min_range=0.3),
             "T_imu_lidar": nominal.as_dict(),
             "self_hits": [SELF_HITS],
         },

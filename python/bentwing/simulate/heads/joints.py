@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing.simulate.kinematics import Motion, quats_xyzw, rotation
+from bentwing.base import geometry
+from bentwing.simulate.kinematics import Motion, rotation
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -50,7 +51,7 @@ class Mount:
         """As `payload.yaml` has it."""
         return {
             "translation": [round(float(x), 9) for x in self.t],
-            "quaternion": [round(float(x), 12) for x in quats_xyzw(self.R[None])[0]],
+            "quaternion": [round(float(x), 12) for x in geometry.from_matrices(self.R)],
         }
 
 

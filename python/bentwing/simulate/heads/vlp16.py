@@ -13,6 +13,7 @@ import numpy as np
 
 from bentwing.simulate.heads.airframe import quadrotor
 from bentwing.simulate.heads.joints import Joint, Mount, Turn
+from bentwing.simulate.lidars.interface import described_lidar
 from bentwing.simulate.lidars.vlp16 import Vlp16
 from bentwing.simulate.rig import Encoder, Head
 from bentwing.simulate.splines import Spline
@@ -50,7 +51,7 @@ def _fixed(rng: np.random.Generator, nominal: Mount, max_range: float, *, exact:
     lidar = Vlp16(max_range=max_range)
     true = nominal if exact else nominal.perturbed(rng, np.radians(0.5), 0.004)
     payload = {
-        "lidar": _lidar(lidar),
+        "lidar": described_lidar(lidar, "vlp16", min_range=0.5),
         "T_imu_lidar": nominal.as_dict(),
         "self_hits": [UPRIGHT if np.array_equal(nominal.R, np.eye(3)) else SIDEWAYS],
     }
@@ -72,23 +73,13 @@ def vlp16_motor(
     zero = 0.0 if exact else float(rng.uniform(-0.004, 0.004))
     encoder = Encoder(angle, zero=zero, sigma=2e-4)
     payload = {
-        "lidar": _lidar(lidar),
+        "lidar": described_lidar(lidar, "vlp16", min_range=0.5),
         "self_hits": [SIDEWAYS],
         "encoder": {"topic": "/encoder", **_motor(motor, nominal)},
     }
     truth = {"encoder": {"zero": round(encoder.zero, 9), **_motor(true_motor, true)}}
     joints: list[Joint] = [true_motor, Turn(AXIS, angle), true]
     return Head([T_body_imu], joints, quadrotor(), lidar, payload, truth, encoder)
-
-
-def _lidar(lidar: Vlp16) -> dict[str, Any]:
-    return {
-        "topic": lidar.topic,
-        "kind": "vlp16",
-        "min_range": 0.5,
-        "max_range": lidar.max_range,
-        "range_sigma": lidar.noise,
-    }
 
 
 def _motor(T_imu_motor: Mount, T_motor_lidar: Mount) -> dict[str, Any]:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 if TYPE_CHECKING:
     import numpy as np
@@ -70,3 +70,14 @@ class Lidar(Protocol):
     ) -> list[Record]:
         """Return the sweeps as they are recorded."""
         ...
+
+
+def described_lidar(lidar: Lidar, kind: str, *, min_range: float) -> dict[str, Any]:
+    """Return the section `lidar` of payload.yaml."""
+    return {
+        "topic": lidar.topic,
+        "kind": kind,
+        "min_range": min_range,
+        "max_range": lidar.max_range,
+        "range_sigma": lidar.noise,
+    }

@@ -69,6 +69,12 @@ def test_places_that_agree_outvote_one_that_looks_better(false_at):
     assert false_at not in found.supporters
 
 
+def test_two_places_that_contradict_each_other_place_nothing():
+    """However much better the one looks."""
+    true, false = transform(1.0, [1.0, 2.0, 0.0]), transform(-1.0, [9.0, 9.0, 0.0])
+    assert placed(candidate(0, true), candidate(2, false, n_alike=500)) is None
+
+
 def test_a_trajectory_that_has_drifted_is_bent_to_its_places():
     """Twenty metres of way between the places are half a metre of drift, and more than is left alone."""
     first, last = transform(0.0, [0.0, 0.0, 0.0]), transform(0.01, [0.0, 0.45, 0.0])

@@ -10,6 +10,8 @@ import numpy as np
 
 from bentwing.base.mount import mount_from_json
 
+from bentwing.base.value import Value
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
@@ -21,8 +23,8 @@ STANDARD_GRAVITY = 9.80665  # m/s²
 _VECTORS = ("gyro_bias", "accel_bias", "gravity")
 
 
-@dataclass(frozen=True, slots=True)
-class Calibration:
+@dataclass(frozen=True, slots=True, eq=False)
+class Calibration(Value):
     """The slow states at the end of the estimate, with their standard deviations.
 
     Attributes

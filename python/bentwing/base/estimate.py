@@ -6,6 +6,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from bentwing.base.value import Value
+
 if TYPE_CHECKING:
     from bentwing.base.breaks import Break
     from bentwing.base.calibration import Calibration
@@ -13,8 +15,8 @@ if TYPE_CHECKING:
     from bentwing.base.window_record import WindowRecord
 
 
-@dataclass(frozen=True, slots=True)
-class Estimate:
+@dataclass(frozen=True, slots=True, eq=False)
+class Estimate(Value):
     """Result of an estimator.
 
     Attributes

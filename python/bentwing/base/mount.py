@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bentwing.base import geometry, transform
+from bentwing.base.value import Value
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -20,8 +21,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-@dataclass(frozen=True, slots=True)
-class Pose:
+@dataclass(frozen=True, slots=True, eq=False)
+class Pose(Value):
     """Pose of a frame in another: coordinates x become `R x + translation`.
 
     Attributes
@@ -69,8 +70,8 @@ class Pose:
         return cls(np.array(described["translation"], float), np.array(quaternion, float))
 
 
-@dataclass(frozen=True, slots=True)
-class FixedMount:
+@dataclass(frozen=True, slots=True, eq=False)
+class FixedMount(Value):
     """A lidar that is fixed to the IMU."""
 
     T_imu_lidar: Pose
@@ -80,8 +81,8 @@ class FixedMount:
         return {"T_imu_lidar": self.T_imu_lidar.to_json()}
 
 
-@dataclass(frozen=True, slots=True)
-class MotorMount:
+@dataclass(frozen=True, slots=True, eq=False)
+class MotorMount(Value):
     """A lidar turned by a motor, whose encoder reads θ.
 
     `T_imu_lidar(θ) = T_imu_motor · Rot(axis, θ + encoder_zero) · T_motor_lidar`

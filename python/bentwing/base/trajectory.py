@@ -4,38 +4,48 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from decimal import Decimal, InvalidOperation
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bentwing.base import geometry
-from bentwing.base.atomic import write_text
-from bentwing.base.clock import NS_PER_S, Clock
-from bentwing.base.errors import InputError
+from bentwing.base.arguments import finite_array, in_order
+from bentwing.base.clock import NS_PER_S
+from bentwing.base.tum import read_poses, write_poses
+from bentwing.base.value import Value
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
+    from typing_extensions import Self
 
 DT = 0.01
 """Interval of the samples of estimated trajectories, s."""
 
-_TUM_COLUMNS = 8
-_LATEST_NS = 2**62  # beyond it differences of stamps overflow
+# Rounding to three digits passes, a transform that scales or mirrors does not.
+_ROTATION_TOLERANCE = 1e-3
 
 
-@dataclass(frozen=True, slots=True)
-class Trajectory:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Trajectory(Value):
     """Poses `T_map_imu` at increasing times; between them p is linear and R is slerped.
+
+    Arguments may be of any numeric type; float64 arrays are taken as they are, without a copy. A
+    slice, a mask or an array of indices selects poses, `trajectory[::10]`, and a single index too:
+    it gives the trajectory of one pose.
 
     Attributes
     ----------
     times : (N,) float64, s since the recording's start, increasing, IMU clock
     positions : (N, 3) float64, m, map frame
     quats_xyzw : (N, 4) float64, unit Hamilton quaternions
+
+    Raises
+    ------
+    TypeError, ValueError
+        If an array has another shape, holds NaN, or the times do not increase.
     """
 
     times: NDArray[np.float64]
@@ -43,16 +53,102 @@ class Trajectory:
     quats_xyzw: NDArray[np.float64]
 
     def __post_init__(self) -> None:
-        n = len(self.times)
-        if self.positions.shape != (n, 3) or self.quats_xyzw.shape != (n, 4):
+        times = finite_array("times", self.times, None)
+        in_order("times", times, strictly=True)
+        n = len(times)
+        object.__setattr__(self, "times", times)
+        object.__setattr__(self, "positions", finite_array("positions", self.positions, n, 3))
+        object.__setattr__(self, "quats_xyzw", finite_array("quats_xyzw", self.quats_xyzw, n, 4))
+
+    @classmethod
+    def from_matrices(cls, times: ArrayLike, T_map_imu: ArrayLike) -> Self:
+        """Make a trajectory of homogeneous matrices.
+
+        Parameters
+        ----------
+        times : (N,), s since the recording's start, increasing
+        T_map_imu : (N, 4, 4), rotation and translation in m, last row 0 0 0 1
+
+        Raises
+        ------
+        TypeError, ValueError
+            If the shapes differ, or a matrix is not a rigid transform.
+        """
+        stamps = finite_array("times", times, None)
+        T = finite_array("T_map_imu", T_map_imu, len(stamps), 4, 4)
+        R = T[:, :3, :3]
+        off = np.abs(R @ R.swapaxes(1, 2) - np.eye(3)).max(axis=(1, 2), initial=0.0)
+        is_rigid = (
+            (off < _ROTATION_TOLERANCE)
+            & (np.linalg.det(R) > 0)
+            & np.all(T[:, 3] == [0.0, 0.0, 0.0, 1.0], axis=1)
+        )
+        if not is_rigid.all():
+            row = int(np.argmin(is_rigid))
             msg = (
-                f"trajectory: expected positions ({n}, 3) and quats_xyzw ({n}, 4), "
-                f"got {self.positions.shape} and {self.quats_xyzw.shape}"
+                f"T_map_imu: matrix {row} is not a rotation and a translation above 0 0 0 1: "
+                f"{T[row].tolist()}"
             )
             raise ValueError(msg)
-        if n and not np.all(np.diff(self.times) > 0):
-            msg = f"trajectory: times must increase, sample {int(np.argmin(np.diff(self.times))) + 1} does not"
-            raise ValueError(msg)
+        return cls(stamps, T[:, :3, 3], geometry.from_matrices(R))
+
+    @classmethod
+    def read_tum(cls, path: Path | str, clock_origin_ns: int | None = None) -> tuple[Self, int]:
+        """Read a trajectory of lines `t x y z qx qy qz qw`; lines that start with # are comments.
+
+        Parameters
+        ----------
+        path : file to read
+        clock_origin_ns : absolute time that becomes zero, ns UTC; default: the first stamp
+
+        Returns
+        -------
+        trajectory : times in s since the origin
+        clock_origin_ns : the origin
+
+        Raises
+        ------
+        InputError
+            If the file cannot be read, a line has no eight numbers, or the stamps do not increase.
+        """
+        stamps_ns, poses = read_poses(Path(path))
+        origin = int(stamps_ns[0]) if clock_origin_ns is None else clock_origin_ns
+        return cls((stamps_ns - origin) / NS_PER_S, poses[:, :3], poses[:, 3:]), origin
+
+    def write_tum(self, path: Path | str, clock_origin_ns: int) -> None:
+        """Write `t x y z qx qy qz qw` with absolute stamps that are exact to the nanosecond.
+
+        Parameters
+        ----------
+        path : file to write, atomically
+        clock_origin_ns : absolute time of `times == 0`, ns UTC
+        """
+        poses = np.hstack([self.positions, self.quats_xyzw])
+        write_poses(Path(path), self.times, poses, clock_origin_ns)
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    def __getitem__(
+        self, chosen: int | slice | Sequence[int] | NDArray[np.bool_] | NDArray[np.intp]
+    ) -> Trajectory:
+        # Of a single index the row is kept as a table of one.
+        rows = [chosen] if isinstance(chosen, (int, np.integer)) else chosen
+        return Trajectory(self.times[rows], self.positions[rows], self.quats_xyzw[rows])
+
+    def __repr__(self) -> str:
+        if not len(self):
+            return "Trajectory(no poses)"
+        poses = "1 pose" if len(self) == 1 else f"{len(self)} poses"
+        return f"Trajectory({poses}, {self.times[0]:.3f} to {self.times[-1]:.3f} s)"
+
+    @property
+    def T_map_imu(self) -> NDArray[np.float64]:
+        """(N, 4, 4) float64, homogeneous."""
+        T = np.zeros((len(self), 4, 4))
+        T[:, :3, :3], T[:, :3, 3] = geometry.to_matrices(self.quats_xyzw), self.positions
+        T[:, 3, 3] = 1.0
+        return T
 
     def covers(self, times: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Whether each of `times` `(N,)` lies between the first and the last pose."""
@@ -95,23 +191,7 @@ class Trajectory:
         if not spans:
             return self
         keep = np.any([(self.times >= a) & (self.times <= b) for a, b in spans], axis=0)
-        return Trajectory(self.times[keep], self.positions[keep], self.quats_xyzw[keep])
-
-    def write_tum(self, path: Path, clock_origin_ns: int) -> None:
-        """Write `t x y z qx qy qz qw` with absolute stamps that are exact to the nanosecond.
-
-        Parameters
-        ----------
-        path : file to write, atomically
-        clock_origin_ns : absolute time of `times == 0`, ns UTC
-        """
-        stamps = Clock(clock_origin_ns).to_absolute_text(self.times)
-        poses = np.hstack([self.positions, self.quats_xyzw])
-        lines = [
-            f"{stamp} {x:.6f} {y:.6f} {z:.6f} {qx:.9f} {qy:.9f} {qz:.9f} {qw:.9f}\n"
-            for stamp, (x, y, z, qx, qy, qz, qw) in zip(stamps, poses.tolist(), strict=True)
-        ]
-        write_text(Path(path), "".join(lines))
+        return self[keep]
 
     def _require_cover(self, times: NDArray[np.float64]) -> None:
         outside = ~self.covers(times)
@@ -124,92 +204,4 @@ class Trajectory:
             raise ValueError(msg)
 
 
-def read_tum(path: Path, clock_origin_ns: int | None = None) -> tuple[Trajectory, int]:
-    """Read a trajectory of lines `t x y z qx qy qz qw`; lines that start with # are comments.
-
-    Parameters
-    ----------
-    path : file to read
-    clock_origin_ns : absolute time that becomes zero, ns UTC; default: the first stamp
-
-    Returns
-    -------
-    trajectory : times in s since the origin
-    clock_origin_ns : the origin
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, a line has no eight numbers, or the stamps do not increase.
-    """
-    stamps_ns, values = read_stamped_rows(
-        Path(path), (_TUM_COLUMNS,), "t x y z qx qy qz qw", ignore_more=True
-    )
-    origin = int(stamps_ns[0]) if clock_origin_ns is None else clock_origin_ns
-    relative_ns = stamps_ns - origin
-    lengths = np.linalg.norm(values[:, 3:], axis=1, keepdims=True)
-    if not np.isfinite(values).all() or (lengths == 0).any():
-        msg = f"{path}: a pose is not finite or has a quaternion of length zero"
-        raise InputError(msg)
-    return Trajectory(relative_ns / NS_PER_S, values[:, :3].copy(), values[:, 3:] / lengths), origin
-
-
-def read_stamped_rows(
-    path: Path, widths: tuple[int, ...], layout: str, *, ignore_more: bool = False
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Read lines of a stamp in seconds and numbers; commas count as spaces, # begins a comment.
-
-    A first line that names the columns (`t,x,y,z`) is left out.
-
-    Parameters
-    ----------
-    path : file to read
-    widths : numbers of columns, stamp included, of which all lines have one
-    layout : names the columns in the messages
-    ignore_more : leave out columns beyond the widest
-
-    Returns
-    -------
-    stamps_ns : (N,) int64, increasing, N > 0
-    values : (N, width - 1) float64
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, a line has another form, or the stamps do not increase.
-    """
-    try:
-        lines = path.read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        msg = f"{path}: not readable as a trajectory ({error})"
-        raise InputError(msg) from error
-    stamps_ns: list[int] = []
-    rows: list[list[float]] = []
-    for number, line in enumerate(lines, start=1):
-        fields = line.replace(",", " ").split()
-        if not fields or fields[0].startswith("#") or (not rows and _is_heading(fields)):
-            continue
-        fields = fields[: max(widths)] if ignore_more else fields
-        expected = (len(rows[0]) + 1,) if rows else widths
-        try:
-            stamps_ns.append(int((Decimal(fields[0]) * NS_PER_S).to_integral_value()))
-            rows.append([float(value) for value in fields[1:]])
-            complete = len(fields) in expected and abs(stamps_ns[-1]) < _LATEST_NS
-        except (InvalidOperation, ValueError, OverflowError):
-            complete = False
-        if not complete:
-            msg = f"{path}, line {number}: expected `{layout}`, found {line[:80]!r}"
-            raise InputError(msg)
-    if not stamps_ns:
-        msg = f"{path}: holds no pose; expected lines of `{layout}`"
-        raise InputError(msg)
-    stamps = np.array(stamps_ns, dtype=np.int64)
-    late = np.diff(stamps) <= 0
-    if late.any():
-        msg = f"{path}: stamps must increase, pose {int(np.argmax(late)) + 2} does not"
-        raise InputError(msg)
-    return stamps, np.array(rows)
-
-
-def _is_heading(fields: list[str]) -> bool:
-    return fields[0].lower() in {"t", "time", "stamp", "timestamp"}
+read_tum = Trajectory.read_tum

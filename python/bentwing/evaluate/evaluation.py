@@ -152,7 +152,8 @@ def _trajectory(
 def _drift(estimate: Trajectory, odometry: Trajectory | None, result: Evaluation) -> None:
     """Drift of the open loop, against the reference if it has poses, else the closed loop."""
     name = "trajectory" if odometry is None else "odometry"
-    against, reference, drifting = "trajectory", estimate, odometry or estimate
+    against, reference = "trajectory", estimate
+    drifting = estimate if odometry is None else odometry
     if result.trajectory is not None and result.trajectory.reference is not None:
         against, reference = "reference", result.trajectory.reference
         drifting = moved_to_point(drifting, result.trajectory.tracked_point.lever_arm)

@@ -11,7 +11,7 @@ import numpy as np
 
 from bentwing.base.clock import NS_PER_S
 from bentwing.base.errors import InputError
-from bentwing.base.trajectory import read_stamped_rows
+from bentwing.base.tum import read_stamped_rows
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bentwing.base.errors import BentwingError, InputError
+from bentwing.base.value import Value
 from bentwing.map.read_e57 import e57_scans
 from bentwing.map.read_rows import PART, pcd_rows, ply_rows
 
@@ -21,8 +22,8 @@ if TYPE_CHECKING:
     Table = tuple[NDArray[np.float64], NDArray[np.float64] | None]
 
 
-@dataclass(frozen=True, slots=True)
-class MapPart:
+@dataclass(frozen=True, slots=True, eq=False)
+class MapPart(Value):
     """Some points of a map.
 
     Attributes

@@ -8,14 +8,16 @@ from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
+from bentwing.base.value import Value
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 _Scalar = TypeVar("_Scalar", bound=np.generic)
 
 
-@dataclass(frozen=True, slots=True)
-class LidarBatch:
+@dataclass(frozen=True, slots=True, eq=False)
+class LidarBatch(Value):
     """Consecutive returns of the lidar.
 
     Attributes
@@ -46,8 +48,8 @@ class LidarBatch:
         )
 
 
-@dataclass(frozen=True, slots=True)
-class ImuBatch:
+@dataclass(frozen=True, slots=True, eq=False)
+class ImuBatch(Value):
     """Consecutive inertial samples.
 
     Attributes
@@ -66,8 +68,8 @@ class ImuBatch:
         return ImuBatch(self.times[keep], self.gyro[keep], self.accel[keep])
 
 
-@dataclass(frozen=True, slots=True)
-class EncoderBatch:
+@dataclass(frozen=True, slots=True, eq=False)
+class EncoderBatch(Value):
     """Consecutive angles of the motor that turns the lidar.
 
     Attributes

@@ -1,4 +1,7 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
+import copy
+import pickle
+
 import numpy as np
 import pytest
 
@@ -100,3 +103,115 @@ def test_a_damaged_trajectory_is_refused_with_its_place(tmp_path, text, message)
 def test_a_missing_trajectory_is_an_input_error(tmp_path):
     with pytest.raises(InputError, match="not readable"):
         read_tum(tmp_path / "none.txt")
+
+
+def test_it_is_as_long_as_it_has_poses():
+    assert len(screw(7)) == 7
+    assert len(screw(7)[:0]) == 0
+
+
+@pytest.mark.parametrize(
+    ("chosen", "rows"),
+    [
+        (slice(2, 5), [2, 3, 4]),
+        (slice(None, None, 4), [0, 4, 8]),
+        (np.arange(9) > 6, [7, 8]),
+        ([1, 3], [1, 3]),
+        (np.array([0, 8]), [0, 8]),
+        (4, [4]),
+        (-1, [8]),
+        (np.int64(2), [2]),
+    ],
+)
+def test_whatever_selects_rows_gives_a_trajectory(chosen, rows):
+    whole = screw(9)
+    part = whole[chosen]
+    assert isinstance(part, Trajectory)
+    assert np.array_equal(part.times, whole.times[rows])
+    assert np.array_equal(part.positions, whole.positions[rows])
+    assert np.array_equal(part.quats_xyzw, whole.quats_xyzw[rows])
+
+
+def test_it_can_be_walked_pose_by_pose_and_no_further():
+    assert [pose.times[0] for pose in screw(3)] == [0.0, 0.01, 0.02]
+    with pytest.raises(IndexError):
+        screw(3)[3]
+
+
+def test_an_order_backwards_in_time_is_refused():
+    with pytest.raises(ValueError, match=r"times: must increase, but row 1 is 0\.01 s after 0\.02"):
+        screw(3)[::-1]
+
+
+def test_matrices_and_back_are_the_same_poses():
+    trajectory = screw()
+    T = trajectory.T_map_imu
+    assert T.shape == (200, 4, 4)
+    point = np.array([1.0, -2.0, 3.0])
+    placed = trajectory.positions + geometry.rotate(trajectory.quats_xyzw, point)
+    assert np.allclose((T @ [*point, 1.0])[:, :3], placed, atol=1e-14)
+    again = Trajectory.from_matrices(trajectory.times, T)
+    assert np.allclose(again.T_map_imu, T, atol=1e-14)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        np.diag([2.0, 2.0, 2.0, 1.0]),
+        np.diag([1.0, 1.0, -1.0, 1.0]),
+        np.block([[np.eye(3), np.zeros((3, 1))], [np.array([[1.0, 0.0, 0.0, 1.0]])]]),
+    ],
+    ids=["scaled", "mirrored", "transposed"],
+)
+def test_matrices_that_are_no_rigid_transforms_are_refused_and_named(wrong):
+    with pytest.raises(ValueError, match="T_map_imu: matrix 1 is not a rotation"):
+        Trajectory.from_matrices([0.0, 1.0], [np.eye(4), wrong])
+
+
+def test_equal_means_equal_poses_and_nothing_else_is_equal():
+    assert screw() == screw()
+    assert screw() != screw(rate=4.1)
+    assert screw(5) != screw(6)
+    assert screw() != 3
+    assert (screw() == np.zeros(3)) is False
+    assert (np.zeros(3) == screw()) is False
+
+
+def test_its_representation_is_short():
+    assert repr(screw()) == "Trajectory(200 poses, 0.000 to 1.990 s)"
+    assert repr(screw(1)) == "Trajectory(1 pose, 0.000 to 0.000 s)"
+    assert repr(screw()[:0]) == "Trajectory(no poses)"
+
+
+def test_copies_and_pickles_are_equal_and_independent():
+    for again in (copy.deepcopy(screw()), pickle.loads(pickle.dumps(screw()))):
+        assert again == screw()
+        assert again.times is not screw().times
+
+
+def test_numbers_of_any_type_become_float64_and_float64_is_not_copied():
+    given = screw(2)
+    single = Trajectory(
+        given.times.astype(np.float32), given.positions.tolist(), given.quats_xyzw[::1]
+    )
+    assert {single.times.dtype, single.positions.dtype} == {np.dtype(np.float64)}
+    assert Trajectory(given.times, given.positions, given.quats_xyzw).positions is given.positions
+
+
+@pytest.mark.parametrize(
+    ("changes", "error", "sentence"),
+    [
+        ({"times": [0.0, np.nan]}, ValueError, "times: row 1 is not finite: nan"),
+        ({"positions": [[0, 0, 0], [0, np.inf, 0]]}, ValueError, "positions: row 1 is not finite"),
+        ({"quats_xyzw": np.full((2, 4), np.nan)}, ValueError, "quats_xyzw: row 0 is not finite"),
+        ({"times": [1.0, 1.0]}, ValueError, "times: must increase, but row 1 is 1 s after 1 s"),
+        ({"positions": np.zeros((3, 3))}, ValueError, r"positions: expected shape \(2, 3\), got"),
+        ({"times": [[0.0, 1.0]]}, ValueError, r"times: expected shape \(N,\), got \(1, 2\)"),
+        ({"times": "now"}, TypeError, "times: expected numbers"),
+        ({"positions": [[0, 0, 0], [0, 0]]}, TypeError, r"positions: expected numbers of shape \(2, 3"),
+    ],
+)
+def test_arrays_that_do_not_fit_are_named(changes, error, sentence):
+    fitting = {"times": [0, 1], "positions": np.zeros((2, 3)), "quats_xyzw": [[0, 0, 0, 1]] * 2}
+    with pytest.raises(error, match=sentence):
+        Trajectory(**{**fitting, **changes})

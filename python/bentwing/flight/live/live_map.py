@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bentwing.base.voxels import VoxelSet, voxel_keys
+from bentwing.base.value import Value
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -21,8 +22,8 @@ if TYPE_CHECKING:
 POINTS_PER_WINDOW = 200_000
 
 
-@dataclass(frozen=True, slots=True)
-class MapUpdate:
+@dataclass(frozen=True, slots=True, eq=False)
+class MapUpdate(Value):
     """What has come to the map since it was asked for last.
 
     Attributes

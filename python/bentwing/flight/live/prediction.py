@@ -12,6 +12,7 @@ from bentwing import _core
 from bentwing.base import geometry
 from bentwing.base.trajectory import DT
 from bentwing.base.transform import from_poses
+from bentwing.base.value import Value
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -26,8 +27,8 @@ MAX_EXTRAPOLATION = 0.1
 OVERLAP = 0.1
 
 
-@dataclass(frozen=True, slots=True)
-class StampedPose:
+@dataclass(frozen=True, slots=True, eq=False)
+class StampedPose(Value):
     """Pose of the IMU in the map at a time.
 
     Attributes

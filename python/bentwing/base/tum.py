@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""Text files of stamps and numbers, as those of trajectories are."""
+
+from __future__ import annotations
+
+from decimal import Decimal, InvalidOperation
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bentwing.base.atomic import write_text
+from bentwing.base.clock import NS_PER_S, Clock
+from bentwing.base.errors import InputError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+_POSE_COLUMNS = 8
+_LATEST_NS = 2**62  # beyond it differences of stamps overflow
+
+
+def write_poses(
+    path: Path,
+    times: NDArray[np.float64],
+    poses: NDArray[np.float64],
+    clock_origin_ns: int,
+) -> None:
+    """Write `t x y z qx qy qz qw` with absolute stamps that are exact to the nanosecond.
+
+    Parameters
+    ----------
+    path : file to write, atomically
+    times : (N,) float64, s
+    poses : (N, 7) float64, position in m and unit quaternion x y z w
+    clock_origin_ns : absolute time of `times == 0`, ns UTC
+    """
+    stamps = Clock(clock_origin_ns).to_absolute_text(times)
+    lines = [
+        f"{stamp} {x:.6f} {y:.6f} {z:.6f} {qx:.9f} {qy:.9f} {qz:.9f} {qw:.9f}\n"
+        for stamp, (x, y, z, qx, qy, qz, qw) in zip(stamps, poses.tolist(), strict=True)
+    ]
+    write_text(path, "".join(lines))
+
+
+def read_poses(path: Path) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Read lines `t x y z qx qy qz qw`; further columns are left out.
+
+    Returns
+    -------
+    stamps_ns : (N,) int64, increasing, N > 0
+    poses : (N, 7) float64, quaternions made unit
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, a line has no eight numbers, or the stamps do not increase.
+    """
+    stamps_ns, poses = read_stamped_rows(
+        path, (_POSE_COLUMNS,), "t x y z qx qy qz qw", ignore_more=True
+    )
+    lengths = np.linalg.norm(poses[:, 3:], axis=1, keepdims=True)
+    if not np.isfinite(poses).all() or (lengths == 0).any():
+        msg = f"{path}: a pose is not finite or has a quaternion of length zero"
+        raise InputError(msg)
+    return stamps_ns, np.hstack([poses[:, :3], poses[:, 3:] / lengths])
+
+
+def read_stamped_rows(
+    path: Path, widths: tuple[int, ...], layout: str, *, ignore_more: bool = False
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Read lines of a stamp in seconds and numbers; commas count as spaces, # begins a comment.
+
+    A first line that names the columns (`t,x,y,z`) is left out.
+
+    Parameters
+    ----------
+    path : file to read
+    widths : numbers of columns, stamp included, of which all lines have one
+    layout : names the columns in the messages
+    ignore_more : leave out columns beyond the widest
+
+    Returns
+    -------
+    stamps_ns : (N,) int64, increasing, N > 0
+    values : (N, width - 1) float64
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, a line has another form, or the stamps do not increase.
+    """
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        msg = f"{path}: not readable as a trajectory ({error})"
+        raise InputError(msg) from error
+    stamps_ns: list[int] = []
+    rows: list[list[float]] = []
+    for number, line in enumerate(lines, start=1):
+        fields = line.replace(",", " ").split()
+        if not fields or fields[0].startswith("#") or (not rows and _is_heading(fields)):
+            continue
+        fields = fields[: max(widths)] if ignore_more else fields
+        expected = (len(rows[0]) + 1,) if rows else widths
+        try:
+            stamps_ns.append(int((Decimal(fields[0]) * NS_PER_S).to_integral_value()))
+            rows.append([float(value) for value in fields[1:]])
+            complete = len(fields) in expected and abs(stamps_ns[-1]) < _LATEST_NS
+        except (InvalidOperation, ValueError, OverflowError):
+            complete = False
+        if not complete:
+            msg = f"{path}, line {number}: expected `{layout}`, found {line[:80]!r}"
+            raise InputError(msg)
+    if not stamps_ns:
+        msg = f"{path}: holds no pose; expected lines of `{layout}`"
+        raise InputError(msg)
+    stamps = np.array(stamps_ns, dtype=np.int64)
+    late = np.diff(stamps) <= 0
+    if late.any():
+        msg = f"{path}: stamps must increase, pose {int(np.argmax(late)) + 2} does not"
+        raise InputError(msg)
+    return stamps, np.array(rows)
+
+
+def _is_heading(fields: list[str]) -> bool:
+    return fields[0].lower() in {"t", "time", "stamp", "timestamp"}

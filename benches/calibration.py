@@ -13,11 +13,9 @@ import numpy as np
 import yaml
 
 from bentwing.base import geometry
-from bentwing.base.progress import Progress
 from bentwing.calibrate import calibrate
 from bentwing.evaluate.nees import nees_bounds
-from bentwing.recording import Payload, Recording
-from bentwing.recording.preprocess import RecordingPart
+from bentwing.recording import Payload
 from bentwing.simulate import Scenario, simulate
 
 REST, RAMP = 2.0, 0.35  # s until the motor is up to its rate, and beyond the revolution
@@ -43,8 +41,7 @@ def run(scenario: Scenario, folder: Path) -> dict:
     """Simulate, calibrate, compare."""
     files = simulate(scenario, folder)
     payload = Payload.load(files.payload)
-    with Recording(files.recording, payload) as recording:
-        found = calibrate(RecordingPart(recording, payload), Progress())
+    found = calibrate(files.recording, payload)
     files.recording.unlink()
     truth, motor = yaml.safe_load(files.calibration.read_text()), found.motor
     axis, believed = np.array(payload.encoder.axis), payload.encoder.T_motor_lidar

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from bentwing.base import geometry
-from bentwing.closing.pose_graph import Links, PoseGraph, SolveSettings, solve
+from bentwing.closing.pose_graph import Links, PoseGraph, SolveSettings, solve_pose_graph
 from bentwing.evaluate.alignment import align
 
 
@@ -42,7 +42,7 @@ def with_known_truth(graph: PoseGraph, seed: int) -> PoseGraph:
     it (the wild bootstrap of Wu 1986, with Rademacher's signs).
     """
     links = graph.links
-    best = solve(graph, SolveSettings(robust=None))
+    best = solve_pose_graph(graph, SolveSettings(robust=None))
     start, end = links.nodes.T
     back = geometry.inverse(best.quats_xyzw[start])
     shifts = geometry.rotate(back, best.positions[end] - best.positions[start])

@@ -38,7 +38,13 @@ from false_links import (
 )
 
 from bentwing.base import geometry
-from bentwing.closing.pose_graph import PoseGraph, Solution, SolveSettings, read_g2o, solve
+from bentwing.closing.pose_graph import (
+    PoseGraph,
+    Solution,
+    SolveSettings,
+    read_g2o,
+    solve_pose_graph,
+)
 
 GRAPHS = (
     "smallGrid3D", "parking-garage", "sphere2500", "torus3D", "cubicle", "sphere_bignoise_vertex3",
@@ -90,7 +96,7 @@ class Peer:
 
 def ours(graph: PoseGraph) -> tuple[float, float]:
     start = time.perf_counter()
-    cost = solve(graph, BELIEVING).cost
+    cost = solve_pose_graph(graph, BELIEVING).cost
     return cost, time.perf_counter() - start
 
 
@@ -155,14 +161,17 @@ class Disturbed:
 def disturb(graph: PoseGraph, clean: Solution, truth: np.ndarray | None, seed: int) -> Disturbed:
     false, n = with_false_links(graph, 0.2, seed)
     start = time.perf_counter()
-    found = solve(false)
+    found = solve_pose_graph(false)
     seconds = time.perf_counter() - start
     n_found = int(np.count_nonzero(found.rejected >= len(graph.links)))
     if truth is None:
         known = with_known_truth(graph, seed)
         truth = known.positions
         given = replace(known, positions=graph.positions, quats_xyzw=graph.quats_xyzw)
-        solutions = [solve(given), solve(with_false_links(given, 0.2, seed)[0])]
+        solutions = [
+            solve_pose_graph(given),
+            solve_pose_graph(with_false_links(given, 0.2, seed)[0]),
+        ]
     else:
         solutions = [clean, found]
     return Disturbed(
@@ -177,7 +186,7 @@ def disturb(graph: PoseGraph, clean: Solution, truth: np.ndarray | None, seed: i
 
 
 def disturb_by_turns(name: str, graph: PoseGraph, folder: Path, seeds: list[int]) -> None:
-    truth, clean = truth_of(name, folder), solve(graph)
+    truth, clean = truth_of(name, folder), solve_pose_graph(graph)
     runs = [disturb(graph, clean, truth, seed) for seed in seeds]
     worst = max(runs, key=lambda run: run.ratio)
     n_loops = int(np.count_nonzero(~graph.links.trusted))

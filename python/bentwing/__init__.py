@@ -1,12 +1,19 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""Accurate trajectories and 3D maps from lidars that move on their carrier, without GNSS."""
+"""Accurate trajectories and 3D maps from lidars that move on their carrier, without GNSS.
+
+Public are the names in `__all__`, here and in the packages of `PACKAGES`. Everything else may change.
+"""
 
 from __future__ import annotations
 
+import logging
 from importlib import import_module
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+from bentwing.base.lazy import lazy
 
 if TYPE_CHECKING:
+    from bentwing.base.calibration import Calibration
     from bentwing.base.errors import (
         BentwingError,
         DivergedError,
@@ -18,26 +25,50 @@ if TYPE_CHECKING:
         SingularSystemError,
         UsageError,
     )
-    from bentwing.base.trajectory import Trajectory
-    from bentwing.flight.live import Odometry
-    from bentwing.odometry.window import WindowResult, register_window
-    from bentwing.recording import Payload, Recording
-    from bentwing.run.merging import Merged, merge
+    from bentwing.base.estimate import Estimate
+    from bentwing.base.mount import FixedMount, MotorMount, Mount, Pose
+    from bentwing.base.progress import Progress
+    from bentwing.base.trajectory import Trajectory, read_tum
+    from bentwing.flight.live.odometry import Odometry
+    from bentwing.odometry.window import register_window
+    from bentwing.odometry.window_result import WindowResult
+    from bentwing.recording.payload import Payload
+    from bentwing.recording.recording import Recording
+    from bentwing.run.merging.runs import Merged, merge
     from bentwing.run.pipeline import map_recording
     from bentwing.run.run import Run
 
     __version__: str
 
+PACKAGES = (
+    "recording",
+    "odometry",
+    "map",
+    "closing",
+    "evaluate",
+    "flight",
+    "simulate",
+    "calibrate",
+)
+"""The public packages; `bentwing.map` is there after `import bentwing`."""
+
 __all__ = [
     "BentwingError",
+    "Calibration",
     "DivergedError",
+    "Estimate",
     "EstimationError",
+    "FixedMount",
     "InputError",
     "Merged",
+    "MotorMount",
+    "Mount",
     "NotEnoughDataError",
     "Odometry",
     "Payload",
     "PayloadError",
+    "Pose",
+    "Progress",
     "Recording",
     "RecordingError",
     "Run",
@@ -48,32 +79,49 @@ __all__ = [
     "__version__",
     "map_recording",
     "merge",
+    "read_tum",
     "register_window",
 ]
 
-# Where the names live; imported when first asked for, so that `import bentwing` costs nothing.
-_HOMES = {
-    "Odometry": "flight.live",
-    "Merged": "run.merging",
-    "merge": "run.merging",
-    "map_recording": "run.pipeline",
-    "Payload": "recording",
-    "Recording": "recording",
-    "WindowResult": "odometry.window",
-    "register_window": "odometry.window",
-    "Run": "run.run",
-    "Trajectory": "base.trajectory",
-}
+_load, _names = lazy(
+    __name__,
+    {
+        "base.calibration": ["Calibration"],
+        "base.errors": [
+            "BentwingError",
+            "DivergedError",
+            "EstimationError",
+            "InputError",
+            "NotEnoughDataError",
+            "PayloadError",
+            "RecordingError",
+            "SingularSystemError",
+            "UsageError",
+        ],
+        "base.estimate": ["Estimate"],
+        "base.mount": ["FixedMount", "MotorMount", "Mount", "Pose"],
+        "base.progress": ["Progress"],
+        "base.trajectory": ["Trajectory", "read_tum"],
+        "flight.live.odometry": ["Odometry"],
+        "odometry.window": ["register_window"],
+        "odometry.window_result": ["WindowResult"],
+        "recording.payload": ["Payload"],
+        "recording.recording": ["Recording"],
+        "run.merging.runs": ["Merged", "merge"],
+        "run.pipeline": ["map_recording"],
+        "run.run": ["Run"],
+    },
+)
+
+# Who wants to read the log sets up its output; without one nothing is printed.
+logging.getLogger(__name__).addHandler(logging.NullHandler())
 
 
-def __getattr__(name: str) -> object:
+def __getattr__(name: str) -> Any:  # noqa: ANN401 - whatever is public
     if name == "__version__":
         return import_module("bentwing.base.provenance").bentwing_version()
-    if name not in __all__:
-        msg = f"module {__name__!r} has no attribute {name!r}"
-        raise AttributeError(msg)
-    return getattr(import_module(f"bentwing.{_HOMES.get(name, 'base.errors')}"), name)
+    return import_module(f"bentwing.{name}") if name in PACKAGES else _load(name)
 
 
 def __dir__() -> list[str]:
-    return sorted(__all__)
+    return sorted([*_names(), *PACKAGES, "__version__"])

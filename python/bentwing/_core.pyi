@@ -290,6 +290,7 @@ class Samples:
     dt : s, interval of the samples
     positions : (N, 3) float64, m, map frame, at least two
     quats_xyzw : (N, 4) float64, unit
+    responses : (K, 6, 20) float64, how the first K follow the slow states, see `responses_at`
     """
 
     def __new__(
@@ -298,6 +299,7 @@ class Samples:
         dt: float,
         positions: NDArray[np.float64],
         quats_xyzw: NDArray[np.float64],
+        responses: NDArray[np.float64] | None = None,
     ) -> Samples: ...
     def __len__(self) -> int: ...
     @property
@@ -365,23 +367,31 @@ class Samples:
 
 @final
 class Surfels:
-    """Surfels of a stretch of time, in the lidar frame at their mean stamps."""
+    """Surfels of a stretch of time, in the lidar frame at their mean stamps.
 
-    @staticmethod
-    def of_levels(
-        levels: Sequence[
-            tuple[float, NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
-        ],
-        stamp: float,
-    ) -> Surfels:
-        """Surfels that are known already, as those of a map, all at one stamp, s.
+    Parameters
+    ----------
+    voxel_sizes : of each level, m, finest first
+    level_starts : the surfels of level l are the rows `level_starts[l]` up to `level_starts[l + 1]`
+    means : (N, 3) float64, m
+    covariances : (N, 9) float64, m², of the points
+    normals : (N, 3) float64, unit, towards the sensor
+    stamps : (N,) float64, s, lidar clock
+    angles : (N,) float64, rad, of the encoder; zero for heads without motor
+    n_points : (N,) uint32
+    """
 
-        Parameters
-        ----------
-        levels : of each the voxel size, m, the means (N, 3), m, the covariances (N, 9), m², and unit
-            normals (N, 3); finest first
-        """
-
+    def __new__(
+        cls,
+        voxel_sizes: Sequence[float],
+        level_starts: Sequence[int],
+        means: NDArray[np.float64],
+        covariances: NDArray[np.float64],
+        normals: NDArray[np.float64],
+        stamps: NDArray[np.float64],
+        angles: NDArray[np.float64],
+        n_points: NDArray[np.uint32],
+    ) -> Surfels: ...
     def __len__(self) -> int: ...
     @property
     def stamps(self) -> NDArray[np.float64]:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from false_links import noisy_sphere_positions, position_error, with_false_links
 
-from bentwing.closing.pose_graph import SolveSettings, read_g2o, solve
+from bentwing.closing.pose_graph import SolveSettings, read_g2o, solve_pose_graph
 
 COSTS = {
     "smallGrid3D": 517.92534,
@@ -37,7 +37,7 @@ def read(shared_data):
     [pytest.param(n, marks=() if n in QUICK else pytest.mark.slow) for n in COSTS],
 )
 def test_the_cost_is_the_lowest_known_to_a_thousandth_within_six_iterations(read, name):
-    solution = solve(read(name).graph, SolveSettings(robust=None))
+    solution = solve_pose_graph(read(name).graph, SolveSettings(robust=None))
     assert solution.cost == pytest.approx(COSTS[name], rel=1e-3)
     assert solution.converged
     assert solution.iterations <= 6
@@ -59,9 +59,9 @@ def test_information_that_is_none_is_counted(read):
 )
 def test_a_fifth_of_false_links_does_not_move_the_positions(read, name, bound):
     graph = read(name).graph
-    clean = solve(graph)
+    clean = solve_pose_graph(graph)
     false, n = with_false_links(graph, 0.2, seed=0)
-    solution = solve(false)
+    solution = solve_pose_graph(false)
     found = np.count_nonzero(solution.rejected >= len(graph.links))
     assert found >= 0.995 * n
     assert position_error(solution.positions, clean.positions) < bound
@@ -70,9 +70,9 @@ def test_a_fifth_of_false_links_does_not_move_the_positions(read, name, bound):
 @pytest.mark.slow
 def test_false_links_are_told_where_information_is_hundreds_of_times_too_sure_of_turns(read):
     graph, truth = read("sphere_bignoise_vertex3").graph, noisy_sphere_positions()
-    clean = position_error(solve(graph).positions, truth)
+    clean = position_error(solve_pose_graph(graph).positions, truth)
     assert clean < 3.1
     false, n = with_false_links(graph, 0.2, seed=0)
-    solution = solve(false)
+    solution = solve_pose_graph(false)
     assert np.count_nonzero(solution.rejected >= len(graph.links)) >= 0.995 * n
     assert position_error(solution.positions, truth) < 1.1 * clean

@@ -7,11 +7,16 @@ use bentwing_registration as core;
 use bentwing_registration::{FixedView as RustView, GlobalPrior, Initial, N_GLOBALS, Problem};
 use bentwing_surfels::{Points, SurfelSet};
 use nalgebra::Matrix3;
-use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, ToPyArray};
+use numpy::{
+    PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods,
+    ToPyArray,
+};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::arrays::{angles as angles_of, finite_number, finite_rows, times, to_array2, vectors};
+use crate::arrays::{
+    angles as angles_of, finite, finite_number, finite_rows, times, to_array2, vectors,
+};
 use crate::errors::{in_pool, solve_error};
 use crate::trajectory::{Globals, Imu, Samples};
 
@@ -80,49 +85,91 @@ impl From<RegistrationSettings> for core::Settings {
 #[pyclass(frozen, module = "bentwing._core")]
 pub(crate) struct Surfels(pub(crate) Arc<SurfelSet>);
 
-/// Voxel size, means (N, 3), covariances (N, 9) and normals (N, 3) of the surfels of a level.
-type Level<'py> = (
-    f64,
-    PyReadonlyArray2<'py, f64>,
-    PyReadonlyArray2<'py, f64>,
-    PyReadonlyArray2<'py, f64>,
+/// What makes surfels again: as the arguments of `Surfels::new`.
+type Columns<'py> = (
+    Vec<f64>,
+    Vec<usize>,
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<u32>>,
 );
 
 #[pymethods]
 impl Surfels {
-    /// Surfels that are known already, as those of a map, all at one stamp.
-    #[staticmethod]
-    fn of_levels(levels: Vec<Level<'_>>, stamp: f64) -> PyResult<Self> {
-        let stamp = finite_number("stamp", stamp)?;
-        let mut set = SurfelSet {
-            level_starts: vec![0],
-            ..SurfelSet::default()
-        };
-        for (voxel_size, means, covariances, normals) in &levels {
-            let means = finite_rows("means", means)?;
-            let covariances: &[[f64; 9]] = finite_rows("covariances", covariances)?;
-            let normals = finite_rows("normals", normals)?;
-            if covariances.len() != means.len() || normals.len() != means.len() {
-                return Err(PyValueError::new_err(format!(
-                    "expected as many covariances and normals as means, got {}, {} and {}",
-                    covariances.len(),
-                    normals.len(),
-                    means.len()
-                )));
-            }
-            set.means.extend(vectors(means));
-            set.normals.extend(vectors(normals));
-            let matrices = covariances.iter().map(|c| Matrix3::from_row_slice(c));
-            set.covariances.extend(matrices);
-            set.voxel_sizes
-                .push(finite_number("voxel size", *voxel_size)?);
-            set.level_starts.push(set.means.len());
+    /// Surfels that are known already: those of level `l` are the rows `level_starts[l]` up to
+    /// `level_starts[l + 1]`.
+    #[new]
+    #[allow(clippy::too_many_arguments, reason = "the columns of a table")]
+    fn new(
+        voxel_sizes: Vec<f64>,
+        level_starts: Vec<usize>,
+        means: PyReadonlyArray2<'_, f64>,
+        covariances: PyReadonlyArray2<'_, f64>,
+        normals: PyReadonlyArray2<'_, f64>,
+        stamps: PyReadonlyArray1<'_, f64>,
+        angles: PyReadonlyArray1<'_, f64>,
+        n_points: PyReadonlyArray1<'_, u32>,
+    ) -> PyResult<Self> {
+        let means = vectors(finite_rows("means", &means)?);
+        let covariances: &[[f64; 9]] = finite_rows("covariances", &covariances)?;
+        let normals = vectors(finite_rows("normals", &normals)?);
+        let n = means.len();
+        if [covariances.len(), normals.len(), n_points.len()] != [n; 3] {
+            return Err(PyValueError::new_err(format!(
+                "expected as many covariances, normals and n_points as means, {n}, got {}, {} and {}",
+                covariances.len(),
+                normals.len(),
+                n_points.len()
+            )));
         }
-        set.stamps = vec![stamp; set.means.len()];
-        set.angles = vec![0.0; set.means.len()];
-        // Nothing asks how many points a known surfel had.
-        set.n_points = vec![1; set.means.len()];
-        Ok(Self(Arc::new(set)))
+        let bounds = [level_starts.first(), level_starts.last()];
+        let cuts = level_starts.is_sorted() && level_starts.len() == voxel_sizes.len() + 1;
+        if !cuts || bounds != [Some(&0), Some(&n)] {
+            return Err(PyValueError::new_err(format!(
+                "level_starts: expected {} increasing numbers from 0 to {n}, got {level_starts:?}",
+                voxel_sizes.len() + 1
+            )));
+        }
+        for size in &voxel_sizes {
+            finite_number("voxel_sizes", *size)?;
+        }
+        Ok(Self(Arc::new(SurfelSet {
+            means,
+            covariances: covariances
+                .iter()
+                .map(|c| Matrix3::from_row_slice(c))
+                .collect(),
+            normals,
+            stamps: finite("stamps", &stamps, n)?.to_vec(),
+            angles: finite("angles", &angles, n)?.to_vec(),
+            n_points: n_points.as_array().to_vec(),
+            level_starts,
+            voxel_sizes,
+        })))
+    }
+
+    /// For copies and pickles.
+    fn __getnewargs__<'py>(&self, py: Python<'py>) -> PyResult<Columns<'py>> {
+        // A covariance is symmetric: its columns are its rows.
+        let covariances: Vec<[f64; 9]> = self
+            .0
+            .covariances
+            .iter()
+            .map(|c| std::array::from_fn(|i| c.as_slice()[i]))
+            .collect();
+        Ok((
+            self.0.voxel_sizes.clone(),
+            self.0.level_starts.clone(),
+            self.means(py)?,
+            to_array2(py, &covariances)?,
+            self.normals(py)?,
+            self.stamps(py),
+            self.angles(py),
+            self.0.n_points.to_pyarray(py),
+        ))
     }
 
     fn __len__(&self) -> usize {

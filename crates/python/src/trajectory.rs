@@ -7,10 +7,12 @@ use bentwing_trajectory::{
 };
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use numpy::{
-    PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, ToPyArray,
+    PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2,
+    PyReadonlyArray3, PyUntypedArrayMethods, ToPyArray,
 };
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
 use crate::arrays::{
     finite_number, finite_rows, finite_vector, times, to_array2, unit_quaternion, vectors,
@@ -22,6 +24,15 @@ use crate::errors::in_pool;
 #[pyclass(frozen, module = "bentwing._core")]
 pub(crate) struct Samples(pub(crate) Trajectory, pub(crate) Vec<PoseResponse>);
 
+/// As the arguments of `Samples::new`.
+type SamplesArguments<'py> = (
+    f64,
+    f64,
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray3<f64>>,
+);
+
 impl Samples {
     /// Poses that nothing but a registration moves.
     pub(crate) fn unmoved(trajectory: Trajectory) -> Self {
@@ -32,11 +43,13 @@ impl Samples {
 #[pymethods]
 impl Samples {
     #[new]
+    #[pyo3(signature = (start, dt, positions, quats_xyzw, responses = None))]
     fn new(
         start: f64,
         dt: f64,
         positions: PyReadonlyArray2<'_, f64>,
         quats_xyzw: PyReadonlyArray2<'_, f64>,
+        responses: Option<PyReadonlyArray3<'_, f64>>,
     ) -> PyResult<Self> {
         let positions = vectors(finite_rows("positions", &positions)?);
         let quats = finite_rows("quats_xyzw", &quats_xyzw)?;
@@ -45,9 +58,21 @@ impl Samples {
             .map(|q| unit_quaternion("quats_xyzw", q))
             .collect();
         let start = finite_number("start", start)?;
+        let responses = responses.as_ref().map_or(Ok(Vec::new()), pose_responses)?;
         Trajectory::new(start, dt, positions, rotations?)
-            .map(Self::unmoved)
+            .map(|trajectory| Self(trajectory, responses))
             .map_err(|e| PyValueError::new_err(e.to_string()))
+    }
+
+    /// For copies and pickles.
+    fn __getnewargs__<'py>(&self, py: Python<'py>) -> PyResult<SamplesArguments<'py>> {
+        Ok((
+            self.0.start(),
+            self.0.dt(),
+            self.positions(py)?,
+            self.quats_xyzw(py)?,
+            response_array(py, &self.1)?,
+        ))
     }
 
     /// Time of the first sample, s.
@@ -187,8 +212,7 @@ impl Samples {
     ) -> PyResult<Bound<'py, PyArray3<f64>>> {
         let at = |i: &usize| self.1.get(*i).unwrap_or(&UNMOVED);
         let chosen: Vec<PoseResponse> = samples.iter().map(at).copied().collect();
-        let flat = chosen.as_flattened().as_flattened();
-        flat.to_pyarray(py).reshape([chosen.len(), 6, N_GLOBALS])
+        response_array(py, &chosen)
     }
 
     /// Lidar points (N, 3) placed in the map.
@@ -210,6 +234,27 @@ impl Samples {
             bentwing_surfels::place_points(points, stamps, angles, &self.0, head)
         })?;
         to_array2(py, &placed)
+    }
+}
+
+/// An array (K, 6, 20) of responses.
+fn response_array<'py>(
+    py: Python<'py>,
+    responses: &[PoseResponse],
+) -> PyResult<Bound<'py, PyArray3<f64>>> {
+    let flat = responses.as_flattened().as_flattened();
+    flat.to_pyarray(py).reshape([responses.len(), 6, N_GLOBALS])
+}
+
+/// The responses in an array (K, 6, 20).
+fn pose_responses(array: &PyReadonlyArray3<'_, f64>) -> PyResult<Vec<PoseResponse>> {
+    let shape = array.shape();
+    let flat = array.as_slice().ok().filter(|_| array.is_c_contiguous());
+    match flat {
+        Some(flat) if shape[1..] == [6, N_GLOBALS] => Ok(flat.as_chunks().0.as_chunks().0.to_vec()),
+        _ => Err(PyValueError::new_err(format!(
+            "responses: expected a C-contiguous array (K, 6, {N_GLOBALS}), got {shape:?}"
+        ))),
     }
 }
 
@@ -244,10 +289,15 @@ impl Imu {
 #[pyclass(frozen, module = "bentwing._core")]
 pub(crate) struct Globals(pub(crate) RustGlobals);
 
-#[derive(FromPyObject)]
+#[derive(FromPyObject, IntoPyObject)]
 struct Transform([f64; 3], [f64; 4]);
 
 impl Transform {
+    fn of(isometry: &Isometry3<f64>) -> Self {
+        let q = &isometry.rotation;
+        Self(isometry.translation.vector.into(), [q.i, q.j, q.k, q.w])
+    }
+
     fn isometry(&self, name: &str) -> PyResult<Isometry3<f64>> {
         let q = unit_quaternion(name, &self.1)?;
         let t = finite_vector(name, self.0)?;
@@ -301,6 +351,24 @@ impl Globals {
             accel_bias: finite_vector("accel_bias", accel_bias)?,
             gravity: finite_vector("gravity", gravity)?,
         }))
+    }
+
+    /// For copies and pickles.
+    fn __getnewargs_ex__<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<((Transform,), Bound<'py, PyDict>)> {
+        let named = PyDict::new(py);
+        named.set_item("latency", self.latency())?;
+        named.set_item("gyro_bias", self.gyro_bias(py))?;
+        named.set_item("accel_bias", self.accel_bias(py))?;
+        named.set_item("gravity", self.gravity(py))?;
+        if let Some(motor) = &self.0.head.motor {
+            named.set_item("motor_axis", vector(py, &motor.axis))?;
+            named.set_item("encoder_zero", motor.zero)?;
+            named.set_item("T_motor_lidar", Transform::of(&motor.T_motor_lidar))?;
+        }
+        Ok(((Transform::of(&self.0.head.T_imu_base),), named))
     }
 
     /// The correction (20,) that leads from `earlier` to these.

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bentwing.base.mount import mount_from_json
-
 from bentwing.base.value import Value
 
 if TYPE_CHECKING:

@@ -8,6 +8,8 @@ import time
 from contextlib import contextmanager
 from typing import IO, TYPE_CHECKING, Protocol
 
+from bentwing.base.arguments import instance
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
@@ -116,6 +118,21 @@ class BarProgress(Progress):
     def note(self, text: str) -> None:
         """Print a line between the bars."""
         print(text, file=sys.stderr, flush=True)
+
+
+def as_progress(value: Progress | None) -> Progress:
+    """Return the progress, None standing for one that says nothing.
+
+    Raises
+    ------
+    TypeError
+        If it is of another type.
+    """
+    if value is None:
+        return Progress()
+    return instance(
+        "progress", value, Progress, "give a subclass with `stage` and `note`, or leave it out"
+    )
 
 
 def create_progress(*, quiet: bool = False) -> Progress:

@@ -1,8 +1,29 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""Calibration of a sensor head: the lidar on its motor, the IMU, the clocks."""
+"""What a recording says of its own set-up: whether it is fit, and the calibration of the head."""
 
-from bentwing.calibrate.calibrate import calibrate
-from bentwing.calibrate.folder import CalibrationFolder
-from bentwing.calibrate.outcome import Calibrated
+from __future__ import annotations
 
-__all__ = ["Calibrated", "CalibrationFolder", "calibrate"]
+from typing import TYPE_CHECKING
+
+from bentwing.base.lazy import lazy
+
+if TYPE_CHECKING:
+    from bentwing.calibrate.head import calibrate
+    from bentwing.calibrate.inspection.inspect import Inspection, inspect
+    from bentwing.calibrate.outcome import Calibrated
+
+__all__ = [
+    "Calibrated",
+    "Inspection",
+    "calibrate",
+    "inspect",
+]
+
+__getattr__, __dir__ = lazy(
+    __name__,
+    {
+        "calibrate.head": ["calibrate"],
+        "calibrate.inspection.inspect": ["Inspection", "inspect"],
+        "calibrate.outcome": ["Calibrated"],
+    },
+)

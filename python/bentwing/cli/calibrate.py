@@ -34,17 +34,20 @@ def calibrate_command(  # noqa: PLR0917 - one parameter per option
     from rich.console import Console
 
     from bentwing.base.progress import create_progress
-    from bentwing.calibrate import CalibrationFolder, calibrate
+    from bentwing.calibrate import calibrate
+    from bentwing.calibrate.folder import CalibrationFolder
     from bentwing.cli.calibration_page import page
-    from bentwing.recording import Payload, Recording
-    from bentwing.recording.preprocess import RecordingPart
     from bentwing.report import draw_wall
 
-    head = Payload.load(payload)
-    with Recording(recording, head) as opened:
-        folder = CalibrationFolder(out)
-        part = RecordingPart(opened, head, start, duration)
-        found = calibrate(part, create_progress(quiet=quiet), threads=threads)
+    folder = CalibrationFolder(out)
+    found = calibrate(
+        recording,
+        payload,
+        start=start,
+        duration=duration,
+        threads=threads,
+        progress=create_progress(quiet=quiet),
+    )
     if (wall := found.wall) is not None:
         draw_wall(folder.file("wall.png"), wall.along, wall.across, wall.halves, wall.gaps)
     folder.finish(found, [*recording, payload])

@@ -13,7 +13,6 @@ from rich.console import Console
 
 from bentwing.calibrate.inspection import inspect
 from bentwing.cli.info_page import page
-from bentwing.recording import Payload
 
 
 def info(
@@ -32,8 +31,7 @@ def info(
     ] = False,
 ) -> None:
     """Tell topics, rates, gaps, spin, stalls and visible structure, and whether mapping can work."""
-    described = None if payload is None else Payload.load(payload)
-    inspection = inspect(recording, described)
+    inspection = inspect(recording, payload)
     if as_json:
         typer.echo(json.dumps({**dataclasses.asdict(inspection), "is_fit": inspection.is_fit}))
         return

@@ -14,7 +14,6 @@ from rich.console import Console
 from bentwing.base.atomic import write_text
 from bentwing.cli.plan_page import as_record, page
 from bentwing.flight.plan import Intent, plan_flight
-from bentwing.recording import Payload
 
 Option = typer.Option
 
@@ -50,7 +49,7 @@ def plan_command(  # noqa: PLR0917 - one parameter per option
         area=area,
         flight_time=60.0 * flight_time,
     )
-    plan = plan_flight(Payload.load(payload), intent)
+    plan = plan_flight(payload, intent)
     if picture is not None:
         from bentwing.report.sphere import sphere_map
 

@@ -1,2 +1,34 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""Numbers of merit: a trajectory or a map against truth, and a map against itself."""
+"""Measures of trajectories and maps: errors, drift, spacing and consistency."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from bentwing.base.lazy import lazy
+
+if TYPE_CHECKING:
+    from bentwing.evaluate.evaluation import Evaluation, Question, evaluate
+    from bentwing.evaluate.subject import Subject, find_subject
+    from bentwing.evaluate.trajectory import AbsoluteError, Drift, absolute_error, drift
+
+__all__ = [
+    "AbsoluteError",
+    "Drift",
+    "Evaluation",
+    "Question",
+    "Subject",
+    "absolute_error",
+    "drift",
+    "evaluate",
+    "find_subject",
+]
+
+__getattr__, __dir__ = lazy(
+    __name__,
+    {
+        "evaluate.evaluation": ["Evaluation", "Question", "evaluate"],
+        "evaluate.subject": ["Subject", "find_subject"],
+        "evaluate.trajectory": ["AbsoluteError", "Drift", "absolute_error", "drift"],
+    },
+)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bentwing.base.errors import UsageError
-from bentwing.base.progress import Progress
+from bentwing.base.progress import Progress, as_progress
 from bentwing.base.trajectory import Trajectory, read_tum
 from bentwing.evaluate.against_surface import (
     THRESHOLD,
@@ -96,7 +96,7 @@ def evaluate(
     InputError
         If a file cannot be used, or a reference does not fit.
     """
-    question, progress = question or Question(), progress or Progress()
+    question, progress = question or Question(), as_progress(progress)
     _require_counterparts(subject, question)
     result = Evaluation()
     path = _trajectory(subject, question, progress, result)

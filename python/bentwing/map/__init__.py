@@ -1,2 +1,31 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""The map: points of a recording brought into one frame, thinned and written to a file."""
+"""The map: from a trajectory and batches to points; cleaned, thinned, written and read."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from bentwing.base.lazy import lazy
+
+if TYPE_CHECKING:
+    from bentwing.map.clean import CleanSettings
+    from bentwing.map.read import MapPart, read_parts, read_points
+    from bentwing.map.writer import MAP_FORMATS, MapFormat
+
+__all__ = [
+    "MAP_FORMATS",
+    "CleanSettings",
+    "MapFormat",
+    "MapPart",
+    "read_parts",
+    "read_points",
+]
+
+__getattr__, __dir__ = lazy(
+    __name__,
+    {
+        "map.clean": ["CleanSettings"],
+        "map.read": ["MapPart", "read_parts", "read_points"],
+        "map.writer": ["MAP_FORMATS", "MapFormat"],
+    },
+)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from importlib import import_module
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Literal, TypeAlias, cast, get_args
 
 import numpy as np
 
@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from typing_extensions import Self
 
+MapFormat: TypeAlias = Literal["laz", "las", "ply", "pcd", "e57"]
+MAP_FORMATS: tuple[MapFormat, ...] = get_args(MapFormat)
+
 _WRITERS = {
     "laz": "write_las.LazWriter",
     "las": "write_las.LasWriter",
@@ -27,7 +30,6 @@ _WRITERS = {
     "pcd": "write_pcd.PcdWriter",
     "e57": "write_e57.E57Writer",
 }
-MAP_FORMATS = tuple(_WRITERS)
 _OFFSET_STEP = 1000.0  # m; a local map gets offset 0, a georeferenced one a round number
 
 

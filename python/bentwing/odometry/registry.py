@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from bentwing.base.errors import UsageError
 from bentwing.odometry.continuous.estimator import Continuous
@@ -19,8 +19,9 @@ if TYPE_CHECKING:
 
     from bentwing.odometry.interface import Estimator
 
+EstimatorName: TypeAlias = Literal["continuous", "kalman", "ndt"]
 EstimatorSettings: TypeAlias = ContinuousSettings | KalmanSettings | NdtSettings
-ESTIMATORS: dict[str, tuple[Callable[..., Estimator], type[BaseModel]]] = {
+ESTIMATORS: dict[EstimatorName, tuple[Callable[..., Estimator], type[BaseModel]]] = {
     "continuous": (Continuous, ContinuousSettings),
     "kalman": (Kalman, KalmanSettings),
     "ndt": (Ndt, NdtSettings),

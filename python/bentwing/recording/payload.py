@@ -8,7 +8,7 @@ coordinates in b to coordinates in a; quaternions are Hamilton, x y z w.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, get_args
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, get_args
 
 import numpy as np
 import yaml
@@ -22,6 +22,7 @@ from pydantic import (
     model_validator,
 )
 
+from bentwing.base.arguments import instance
 from bentwing.base.errors import PayloadError
 from bentwing.base.mount import Pose
 from bentwing.recording.lidar_kinds import KIND_DEFAULTS, LidarKind, VelodyneModel
@@ -275,6 +276,27 @@ class Payload(_Section):
     def T_imu_lidar_matrix(self) -> NDArray[np.float64]:
         """(4, 4) of the fixed mount; the identity where none is given (no IMU)."""
         return np.eye(4) if self.T_imu_lidar is None else self.T_imu_lidar.pose.matrix
+
+
+PayloadLike: TypeAlias = Payload | Path | str | None
+"""A sensor head, the payload.yaml that describes it, or None for `Payload.default`."""
+
+
+def as_payload(value: PayloadLike) -> Payload:
+    """Return the sensor head, from its file if need be.
+
+    Raises
+    ------
+    TypeError, PayloadError
+        If it is of another type, or its file is invalid.
+    """
+    if value is None:
+        return Payload.default()
+    if isinstance(value, (str, Path)):
+        return Payload.load(value)
+    return instance(
+        "payload", value, Payload, "give the path of a payload.yaml, a Payload, or None"
+    )
 
 
 def _read_yaml(path: Path) -> object:

@@ -14,7 +14,7 @@ from bentwing.recording.containers.source import open_source
 from bentwing.recording.fixes import Fixes, read_fixes
 from bentwing.recording.open_streams import open_streams
 from bentwing.recording.packets.peek import peek_imu, peek_lidar
-from bentwing.recording.payload import Payload
+from bentwing.recording.payload import as_payload
 from bentwing.recording.peek import Peek, peek
 from bentwing.recording.slots import group_into_slots, trimmed
 from bentwing.recording.stream_warnings import stream_warnings
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
     from bentwing.recording.batches import Batch
     from bentwing.recording.containers.scanned import TopicInfo
+    from bentwing.recording.payload import PayloadLike
     from bentwing.recording.streams import Stream
 
 SEEK_MARGIN = 5.0  # s by which messages may reach the recorder late
@@ -39,7 +40,8 @@ class Recording:
     Parameters
     ----------
     paths : one file or folder, or the consecutive parts of one recording
-    payload : the sensor head; default: a generic lidar without IMU
+    payload : the sensor head, or the payload.yaml that describes it; default: a generic lidar
+        without IMU
     strict : refuse what cannot be mapped (no time per point, IMU in wrong units, …); False only
         reports, for inspection
 
@@ -52,13 +54,13 @@ class Recording:
     def __init__(
         self,
         paths: Path | str | Sequence[Path | str],
-        payload: Payload | None = None,
+        payload: PayloadLike = None,
         *,
         strict: bool = True,
     ) -> None:
         listed = [paths] if isinstance(paths, (str, Path)) else list(paths)
         self.paths = [Path(path) for path in listed]
-        self.payload = payload or Payload.default()
+        self.payload = as_payload(payload)
         self.strict = strict
         self._source = open_source(self.paths)
         self._streams: dict[str, Stream] = {}

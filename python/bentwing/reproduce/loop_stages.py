@@ -18,7 +18,7 @@ from bentwing.base.trajectory import Trajectory
 from bentwing.base.transform import from_poses
 from bentwing.closing.global_registration import close_loops
 from bentwing.closing.places import MatchSettings, describe_run, link_between, match_places
-from bentwing.closing.pose_graph import Links, PoseGraph, deform_trajectory, solve
+from bentwing.closing.pose_graph import Links, PoseGraph, deform_trajectory, solve_pose_graph
 from bentwing.evaluate.trajectory import absolute_error
 from bentwing.recording import Payload, Recording
 from bentwing.recording.preprocess import RecordingPart
@@ -169,7 +169,7 @@ def _linked(drifted: Trajectory, places: list[Place]) -> tuple[Trajectory, int, 
         ),
         np.arange(len(at)) == 0,
     )
-    solution = solve(graph)
+    solution = solve_pose_graph(graph)
     bent = deform_trajectory(drifted, at, solution.positions, solution.quats_xyzw)
     return bent, len(found), len(solution.rejected)
 

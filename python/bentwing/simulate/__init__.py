@@ -6,8 +6,26 @@ A simulation ends in a recording and enters the pipeline by the front door, like
 
 from __future__ import annotations
 
-from bentwing.simulate.scenario import Scenario
-from bentwing.simulate.simulation import simulate
-from bentwing.simulate.write import SimulatedRecording
+from typing import TYPE_CHECKING
 
-__all__ = ["Scenario", "SimulatedRecording", "simulate"]
+from bentwing.base.lazy import lazy
+
+if TYPE_CHECKING:
+    from bentwing.simulate.scenario import Scenario
+    from bentwing.simulate.simulation import simulate
+    from bentwing.simulate.write import SimulatedRecording
+
+__all__ = [
+    "Scenario",
+    "SimulatedRecording",
+    "simulate",
+]
+
+__getattr__, __dir__ = lazy(
+    __name__,
+    {
+        "simulate.scenario": ["Scenario"],
+        "simulate.simulation": ["simulate"],
+        "simulate.write": ["SimulatedRecording"],
+    },
+)

@@ -208,7 +208,11 @@ def test_numbers_of_any_type_become_float64_and_float64_is_not_copied():
         ({"positions": np.zeros((3, 3))}, ValueError, r"positions: expected shape \(2, 3\), got"),
         ({"times": [[0.0, 1.0]]}, ValueError, r"times: expected shape \(N,\), got \(1, 2\)"),
         ({"times": "now"}, TypeError, "times: expected numbers"),
-        ({"positions": [[0, 0, 0], [0, 0]]}, TypeError, r"positions: expected numbers of shape \(2, 3"),
+        (
+            {"positions": [[0, 0, 0], [0, 0]]},
+            TypeError,
+            r"positions: expected numbers of shape \(2, 3",
+        ),
     ],
 )
 def test_arrays_that_do_not_fit_are_named(changes, error, sentence):

@@ -14,7 +14,11 @@ from bentwing.recording.batches import EncoderBatch, ImuBatch, LidarBatch
 
 POSE = Pose(np.array([1.0, 2.0, 3.0]), np.array([0.0, 0.0, 0.0, 1.0]))
 CALIBRATION = Calibration(
-    0.001, MotorMount(POSE, np.array([0.0, 0.0, 1.0]), 0.1, POSE), np.ones(3), np.ones(3), np.ones(3)
+    0.001,
+    MotorMount(POSE, np.array([0.0, 0.0, 1.0]), 0.1, POSE),
+    np.ones(3),
+    np.ones(3),
+    np.ones(3),
 )
 TRAJECTORY = Trajectory([0.0, 1.0], np.zeros((2, 3)), [[0, 0, 0, 1]] * 2)
 VALUES = {
@@ -38,7 +42,7 @@ def test_a_value_equals_its_copies_and_pickles_and_nothing_of_another_type(value
 
 
 def test_one_element_makes_a_difference():
-    moved = replace(POSE, translation=POSE.translation + [0.0, 0.0, 1e-9])
+    moved = replace(POSE, translation=POSE.translation + np.array([0.0, 0.0, 1e-9]))
     assert moved != POSE
     assert FixedMount(moved) != FixedMount(POSE)
     assert replace(CALIBRATION, gyro_bias=np.zeros(3)) != CALIBRATION

@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
 """A lidar turns and moves through a box; its trajectory is disturbed and has to come back."""
 
+import copy
+import pickle
+
 import numpy as np
 import pytest
 
-from bentwing import register_window
+from bentwing import NotEnoughDataError, Payload, Trajectory, register_window
 from bentwing.base import geometry
-from bentwing.base.trajectory import Trajectory
-from bentwing.odometry.continuous.settings import ContinuousSettings, SurfelSettings
-from bentwing.recording import Payload
+from bentwing.odometry import ContinuousSettings, SurfelSettings
+from bentwing.recording import ImuBatch
 
 LOW, HIGH = np.array([-5.0, -4.0, -1.2]), np.array([5.0, 4.0, 2.0])  # m, corners of the box
 DURATION = 3.0  # s
@@ -105,16 +107,142 @@ def test_an_earlier_window_holds_a_later_one():
     assert error_of(loose.trajectory)[at_the_end].min() > 0.02
 
 
+@pytest.fixture(scope="module")
+def window():
+    points, times = seen(truth())
+    return register_window(points, times, disturbed(truth()), payload=PAYLOAD, settings=SETTINGS)
+
+
+def copied(value):
+    return copy.deepcopy(value)
+
+
+def pickled(value):
+    return pickle.loads(pickle.dumps(value))
+
+
+@pytest.mark.parametrize("again", [copied, pickled])
+def test_copies_and_pickles_equal_it_and_hold_a_later_window_just_as_well(window, again):
+    other = again(window)
+    assert other == window
+    points, times = seen(truth(), 20_000)
+    held = [
+        register_window(points, times, truth(), payload=PAYLOAD, fixed_views=[view])
+        for view in (window.fixed_view(0.0, 1.5), again(window.fixed_view(0.0, 1.5)))
+    ]
+    assert held[0].n_fixed_matches == held[1].n_fixed_matches > 50
+    # Quaternions are made unit again, which rounds.
+    assert np.allclose(held[0].trajectory.positions, held[1].trajectory.positions, atol=1e-9)
+
+
+def test_comparing_never_raises(window):
+    assert window == window
+    assert window != 3
+    assert window.fixed_view() != window.fixed_view(0.0, 1.0)
+
+
+def frozen(array):
+    array.setflags(write=False)
+    return array
+
+
 @pytest.mark.parametrize(
-    ("changes", "sentence"),
+    "form",
     [
-        ({"points": np.zeros((5, 2))}, r"points: expected shape \(N, 3\)"),
-        ({"times": np.array([0.5, 0.4, 0.6, 0.7, 0.8])}, "times|stamps: must not decrease"),
-        ({"times": np.linspace(1, 9, 5)}, "within the prior trajectory"),
-        ({"times": np.empty(0), "points": np.empty((0, 3))}, "at least one"),
+        lambda array: array.tolist(),
+        lambda array: np.repeat(array, 2, axis=0)[::2],
+        np.asfortranarray,
+        frozen,
+    ],
+    ids=["lists", "views", "columns first", "read-only"],
+)
+def test_arrays_in_any_form_give_the_same(form):
+    points, times = seen(truth(), 8_000)
+    result = register_window(points, times, truth(), payload=PAYLOAD)
+    assert register_window(form(points), form(times), truth(), payload=PAYLOAD) == result
+
+
+def test_single_precision_is_taken():
+    points, times = seen(truth(), 8_000)
+    result = register_window(points.astype(np.float32), times, truth(), payload=PAYLOAD)
+    assert result.n_matches > 50
+
+
+def test_a_payload_may_be_given_by_its_file(tmp_path):
+    path = tmp_path / "payload.yaml"
+    path.write_text(f"lidar: {{range_sigma: {RANGE_SIGMA}}}\nimu: null\n")
+    points, times = seen(truth(), 8_000)
+    by_value = register_window(points, times, truth(), payload=PAYLOAD)
+    assert register_window(points, times, truth(), payload=path) == by_value
+    assert register_window(points, times, truth(), payload=str(path)) == by_value
+
+
+def scattered(n=50):
+    rng = np.random.default_rng(0)
+    return rng.uniform(-5, 5, (n, 3)), np.sort(rng.uniform(0, DURATION, n))
+
+
+def in_millimetres():
+    points, times = seen(truth(), 8_000)
+    return 1e3 * points, times
+
+
+@pytest.mark.parametrize("given", [scattered, in_millimetres])
+def test_points_that_say_nothing_are_refused_with_what_was_found(given):
+    with pytest.raises(
+        NotEnoughDataError, match=r"points: \d+ over .* make \d+ surfels.*in metres"
+    ):
+        register_window(*given(), truth(), payload=PAYLOAD)
+
+
+IMU = ImuBatch(np.arange(0, 3.1, 0.01), np.zeros((310, 3)), np.tile([0.0, 0.0, 9.8], (310, 1)))
+MOTOR = Payload.model_validate({"encoder": {}})
+
+
+@pytest.mark.parametrize(
+    ("changes", "error", "sentence"),
+    [
+        (
+            {"points": np.zeros((5, 2))},
+            ValueError,
+            r"points: expected shape \(N, 3\), got \(5, 2\)",
+        ),
+        ({"points": np.full((5, 3), np.nan)}, ValueError, "points: row 0 is not finite"),
+        (
+            {"points": "cloud.laz"},
+            TypeError,
+            r"points: expected numbers of shape \(N, 3\), got str",
+        ),
+        ({"times": np.array([0.5, 0.4, 0.6, 0.7, 0.8])}, ValueError, "times: must not decrease"),
+        ({"times": np.linspace(1, 9, 5)}, ValueError, "times: .* within the prior trajectory"),
+        ({"times": np.linspace(1, 2, 4)}, ValueError, r"times: expected shape \(5,\), got \(4,\)"),
+        ({"times": [], "points": np.empty((0, 3))}, ValueError, "times: expected at least one"),
+        ({"prior": np.eye(4)}, TypeError, r"prior: expected a Trajectory, got ndarray; make one"),
+        ({"prior": truth()[:1]}, ValueError, "prior: .* at least two poses"),
+        ({"prior": truth()[np.arange(310) % 7 > 0]}, ValueError, "prior: .* resample it"),
+        ({"angles": np.zeros(4)}, ValueError, r"angles: expected shape \(5,\), got \(4,\)"),
+        ({"payload": MOTOR}, ValueError, "angles: expected the motor's angle at each of the 5"),
+        ({"imu": (1, 2, 3)}, TypeError, "imu: expected an ImuBatch, got tuple; make one"),
+        ({"imu": IMU.where(slice(0, 0))}, ValueError, "imu: expected samples over the prior"),
+        (
+            {"imu": ImuBatch(IMU.times[::-1], IMU.gyro, IMU.accel)},
+            ValueError,
+            "imu.times: must not decrease",
+        ),
+        ({"imu": ImuBatch(IMU.times, IMU.gyro[1:], IMU.accel)}, ValueError, "imu.gyro: expected"),
+        ({"fixed_views": 3}, TypeError, "fixed_views: expected a list, got int"),
+        ({"fixed_views": [3]}, TypeError, "fixed_views: expected a FixedView, got int"),
+        ({"payload": 3}, TypeError, "payload: expected a Payload, got int; give the path"),
+        ({"calibration": {}}, TypeError, "calibration: expected a Calibration, got dict"),
+        ({"settings": {}}, TypeError, "settings: expected a ContinuousSettings, got dict; make"),
+        ({"threads": 0}, ValueError, "threads: expected a number from 1 on, or None"),
+        ({"threads": "all"}, TypeError, "threads: expected an int, got str"),
     ],
 )
-def test_arguments_that_do_not_fit_are_named(changes, sentence):
-    arguments = {"points": np.ones((5, 3)), "times": np.linspace(0.5, 0.9, 5), **changes}
-    with pytest.raises(ValueError, match=sentence):
-        register_window(arguments["points"], arguments["times"], truth())
+def test_arguments_that_do_not_fit_are_named(changes, error, sentence):
+    arguments = {
+        "points": np.ones((5, 3)), "times": np.linspace(0.5, 0.9, 5), "prior": truth(), **changes
+    }  # fmt: skip
+    points, times, prior = (arguments.pop(name) for name in ("points", "times", "prior"))
+    with pytest.raises(error, match=sentence):
+        register_window(points, times, prior, **arguments)

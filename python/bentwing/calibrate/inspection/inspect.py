@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from bentwing.recording.containers.scanned import TopicInfo
-    from bentwing.recording.payload import Payload
+    from bentwing.recording.payload import PayloadLike
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,8 +75,13 @@ class Inspection:
         return not self.defects
 
 
-def inspect(paths: Path | str | Sequence[Path | str], payload: Payload | None = None) -> Inspection:
+def inspect(paths: Path | str | Sequence[Path | str], payload: PayloadLike = None) -> Inspection:
     """Read a recording once and report on it.
+
+    Parameters
+    ----------
+    paths : one recording, or its consecutive parts
+    payload : the sensor head, or the payload.yaml that describes it
 
     Raises
     ------

@@ -4,11 +4,11 @@
 from __future__ import annotations
 
 from pathlib import Path  # noqa: TC003 - pydantic reads the annotations
-from typing import Literal
+from typing import Literal, TypeAlias
 
 from pydantic import BaseModel, ConfigDict, Field
 
-Mode = Literal["rigid", "constraints", "off"]
+GeoreferenceMode: TypeAlias = Literal["rigid", "constraints", "off"]
 
 
 class GeoreferenceSettings(BaseModel):
@@ -25,6 +25,6 @@ class GeoreferenceSettings(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    mode: Mode = "rigid"
+    mode: GeoreferenceMode = "rigid"
     epsg: int | None = Field(default=None, gt=0)
     control_points: Path | None = None

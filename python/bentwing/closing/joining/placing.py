@@ -18,7 +18,13 @@ from bentwing.base.transform import from_poses, inverse
 from bentwing.closing.joining.matches import Match, Part, connected
 from bentwing.closing.joining.survey import middle_of
 from bentwing.closing.places import link_between
-from bentwing.closing.pose_graph import GravityTerms, Links, PoseGraph, deform_trajectory, solve
+from bentwing.closing.pose_graph import (
+    GravityTerms,
+    Links,
+    PoseGraph,
+    deform_trajectory,
+    solve_pose_graph,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -84,7 +90,9 @@ def place_parts(
     positions, quats = graph.guess([matches[k] for k in rows])
     fixed = np.zeros(len(positions), dtype=np.bool_)
     fixed[0] = True
-    found = solve(PoseGraph(positions, quats, links, fixed, graph.gravity(len(positions))))
+    found = solve_pose_graph(
+        PoseGraph(positions, quats, links, fixed, graph.gravity(len(positions)))
+    )
     n_trusted = len(links) - len(rows)
     after = list(matches)
     for row in found.rejected:

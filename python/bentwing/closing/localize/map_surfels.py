@@ -131,13 +131,15 @@ class SurfelMaker:
 
 def core_surfels(levels: list[MapSurfels]) -> _core.Surfels:
     """Return the surfels as the core takes those of a map."""
-    rows = [
-        (
-            level.voxel_size,
-            np.ascontiguousarray(level.means),
-            np.ascontiguousarray(level.covariances.reshape(-1, 9)),
-            np.ascontiguousarray(level.normals),
-        )
-        for level in levels
-    ]
-    return _core.Surfels.of_levels(rows, STAMP)
+    counts = [len(level.means) for level in levels]
+    n = sum(counts)
+    return _core.Surfels(
+        [level.voxel_size for level in levels],
+        np.cumsum([0, *counts]).tolist(),
+        np.concatenate([level.means for level in levels]),
+        np.concatenate([level.covariances.reshape(-1, 9) for level in levels]),
+        np.concatenate([level.normals for level in levels]),
+        np.full(n, STAMP),
+        np.zeros(n),
+        np.ones(n, np.uint32),  # nothing asks how many points a known surfel had
+    )

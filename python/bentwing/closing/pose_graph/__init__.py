@@ -16,7 +16,12 @@ from bentwing.closing.pose_graph.graph import (
     PoseGraph,
     nearest_semidefinite,
 )
-from bentwing.closing.pose_graph.solve import RobustSettings, Solution, SolveSettings, solve
+from bentwing.closing.pose_graph.solve import (
+    RobustSettings,
+    Solution,
+    SolveSettings,
+    solve_pose_graph,
+)
 
 __all__ = [
     "MAP",
@@ -30,6 +35,6 @@ __all__ = [
     "deform_trajectory",
     "nearest_semidefinite",
     "read_g2o",
-    "solve",
+    "solve_pose_graph",
     "write_g2o",
 ]

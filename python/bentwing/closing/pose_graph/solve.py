@@ -92,7 +92,7 @@ class Solution:
         return np.flatnonzero(self.weights == 0.0)
 
 
-def solve(graph: PoseGraph, settings: SolveSettings | None = None) -> Solution:
+def solve_pose_graph(graph: PoseGraph, settings: SolveSettings | None = None) -> Solution:
     """Find the poses that agree best with the links, and the links that are false.
 
     The search begins at the given poses or at those of the chordal relaxation, whichever cost

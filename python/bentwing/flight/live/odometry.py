@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bentwing.base.arguments import thread_count
 from bentwing.base.errors import UsageError
 from bentwing.flight.control import StallWatch
 from bentwing.flight.live.backlog import Backlog
@@ -21,12 +22,11 @@ from bentwing.flight.live.state import LiveState, Published
 from bentwing.flight.live.status import Status, status_of
 from bentwing.flight.live.worker import Worker
 from bentwing.odometry import create
-from bentwing.recording import EncoderBatch, ImuBatch, LidarBatch, Payload
+from bentwing.recording.batches import EncoderBatch, ImuBatch, LidarBatch
+from bentwing.recording.payload import as_payload
 from bentwing.recording.preprocess import Preprocessing
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from numpy.typing import ArrayLike, NDArray
     from typing_extensions import Self
 
@@ -34,8 +34,9 @@ if TYPE_CHECKING:
     from bentwing.base.trajectory import Trajectory
     from bentwing.base.window_record import WindowRecord
     from bentwing.flight.control import Stall
-    from bentwing.odometry import EstimatorSettings
-    from bentwing.recording import Batch
+    from bentwing.odometry import EstimatorName, EstimatorSettings
+    from bentwing.recording.batches import Batch
+    from bentwing.recording.payload import PayloadLike
 
 
 class Odometry:
@@ -48,7 +49,7 @@ class Odometry:
 
     Parameters
     ----------
-    payload : the sensor head, or the payload.yaml that describes it
+    payload : the sensor head, or the payload.yaml that describes it; None: a generic lidar without IMU
     estimator : `continuous`; or for a 3D lidar, with the pose corrected ten times a second, `kalman`
         with an IMU, or `ndt`, which needs none
     settings : of the estimator; default: as `map_recording`
@@ -61,9 +62,9 @@ class Odometry:
 
     def __init__(
         self,
-        payload: Payload | Path | str,
+        payload: PayloadLike,
         *,
-        estimator: str = "continuous",
+        estimator: EstimatorName = "continuous",
         settings: EstimatorSettings | None = None,
         threads: int | None = None,
         map_spacing: float = 0.1,
@@ -77,7 +78,7 @@ class Odometry:
         if max_map_points < 1 or not max_lag > 0:
             msg = f"max_map_points and max_lag: expected above zero, got {max_map_points}, {max_lag} s"
             raise UsageError(msg)
-        head = payload if isinstance(payload, Payload) else Payload.load(payload)
+        head, n_threads = as_payload(payload), thread_count(threads)
         self._payload = head
         self._spin = None if usual_rate is None else StallWatch(usual_rate)
         self._backlog = Backlog(max_lag)
@@ -95,7 +96,7 @@ class Odometry:
             self._engine,
             Preprocessing(head, self._filtered),
             self._state,
-            partial(LiveMap, map_spacing, max_map_points, threads or 0),
+            partial(LiveMap, map_spacing, max_map_points, n_threads),
         )
         # Not a method of this object, which could then never be collected.
         self._stop = weakref.finalize(self, self._worker.stop)

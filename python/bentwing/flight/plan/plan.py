@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING
 from bentwing.base.errors import UsageError
 from bentwing.flight.plan.patterns import PATTERNS, ScanPattern
 from bentwing.flight.plan.turning import Coverage, Turning, coverage, turning_of
+from bentwing.recording.payload import as_payload
 
 if TYPE_CHECKING:
-    from bentwing.recording import Payload
+    from bentwing.recording.payload import Payload, PayloadLike
 
 RANGES = (1.0, 2.0, 5.0, 10.0, 15.0, 30.0, 60.0, 100.0)
 """m, at which the spacing of points is given, as far as the lidar reaches."""
@@ -120,27 +121,27 @@ class Plan:
     n_flights: int
 
 
-def plan_flight(payload: Payload, intent: Intent | None = None) -> Plan:
-    """Plan a flight with a head.
+def plan_flight(payload: PayloadLike, intent: Intent | None = None) -> Plan:
+    """Plan a flight with a head, or the payload.yaml that describes it.
 
     Raises
     ------
     UsageError
         If the structure is beyond the lidar's reach, or a battery does not last for a lane.
     """
-    intent = intent or Intent()
-    if intent.distance > payload.lidar.max_range:
+    head, intent = as_payload(payload), intent or Intent()
+    reach = head.lidar.max_range
+    if intent.distance > reach:
         msg = (
-            f"distance: {intent.distance:g} m is beyond the {payload.lidar.max_range:g} m that the "
+            f"distance: {intent.distance:g} m is beyond the {reach:g} m that the "
             f"lidar reaches; fly nearer or give another max_range in the payload"
         )
         raise UsageError(msg)
-    pattern = _pattern(payload, intent)
-    turning = turning_of(payload, pattern)
+    pattern = _pattern(head, intent)
+    turning = turning_of(head, pattern)
     seen = coverage(turning, pattern)
     spin = None if turning.turned == "fixed" else spin_range(pattern, seen.sweep, intent)
     rate = 0.0 if spin is None else math.sqrt(spin.lowest * spin.lines)
-    reach = payload.lidar.max_range
     spacings = tuple(_spacing(pattern, rate, r) for r in RANGES if r <= reach)
     time, n_flights = site_time(intent)
     return Plan(turning, pattern, intent, spin, rate, spacings, seen, time, n_flights)

@@ -10,7 +10,7 @@ import pytest
 from false_links import position_error, with_false_links, with_known_truth
 
 from bentwing.base import geometry
-from bentwing.closing.pose_graph import SolveSettings, solve
+from bentwing.closing.pose_graph import SolveSettings, solve_pose_graph
 
 TURN_SIGMA, SHIFT_SIGMA = 0.01, 0.05  # of the helix's links, rad and m, as their information says
 
@@ -40,28 +40,30 @@ def noisy(helix):
 @pytest.mark.parametrize("seed", range(6))
 def test_a_fifth_of_false_links_is_rejected_and_changes_nothing(helix, noisy, seed):
     assert position_error(noisy.positions, helix.positions) > 10 * SHIFT_SIGMA
-    clean = solve(noisy)
+    clean = solve_pose_graph(noisy)
     assert not len(clean.rejected)
     assert position_error(clean.positions, helix.positions) < 2 * SHIFT_SIGMA
     false, n = with_false_links(noisy, 0.2, seed)
-    solution = solve(false)
+    solution = solve_pose_graph(false)
     assert solution.rejected.tolist() == list(range(len(noisy.links), len(noisy.links) + n))
     assert position_error(solution.positions, clean.positions) < 1e-6
 
 
 def test_the_same_false_links_give_the_same_bytes(noisy):
     false, _ = with_false_links(noisy, 0.2, seed=1)
-    first, second = solve(false), solve(false)
+    first, second = solve_pose_graph(false), solve_pose_graph(false)
     assert first.positions.tobytes() == second.positions.tobytes()
     assert first.weights.tobytes() == second.weights.tobytes()
 
 
 def test_a_graph_that_is_given_a_truth_has_errors_as_large_as_before(noisy):
-    best = solve(noisy, SolveSettings(robust=None))
+    best = solve_pose_graph(noisy, SolveSettings(robust=None))
     known = with_known_truth(noisy, seed=2)
     np.testing.assert_array_equal(known.positions, best.positions)
-    again = solve(replace(known, positions=noisy.positions, quats_xyzw=noisy.quats_xyzw))
+    again = solve_pose_graph(replace(known, positions=noisy.positions, quats_xyzw=noisy.quats_xyzw))
     assert 0.1 * SHIFT_SIGMA < position_error(again.positions, best.positions) < 2 * SHIFT_SIGMA
     # At the truth the links are off by what they have been off from it.
-    fixed = solve(replace(known, fixed=np.ones(len(known), np.bool_)), SolveSettings(robust=None))
+    fixed = solve_pose_graph(
+        replace(known, fixed=np.ones(len(known), np.bool_)), SolveSettings(robust=None)
+    )
     np.testing.assert_allclose(fixed.cost, best.cost, rtol=0.02)

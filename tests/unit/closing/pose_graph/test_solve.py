@@ -6,7 +6,14 @@ import pytest
 
 from bentwing.base import geometry
 from bentwing.base.errors import SingularSystemError
-from bentwing.closing.pose_graph import MAP, GravityTerms, Links, PoseGraph, SolveSettings, solve
+from bentwing.closing.pose_graph import (
+    MAP,
+    GravityTerms,
+    Links,
+    PoseGraph,
+    SolveSettings,
+    solve_pose_graph,
+)
 
 PLAIN = SolveSettings(robust=None)
 
@@ -22,7 +29,7 @@ def with_link(links, nodes, position, quat, information, *, trusted=False):
 
 
 def test_exact_links_bring_disturbed_poses_back(helix, disturbed):
-    solution = solve(disturbed)
+    solution = solve_pose_graph(disturbed)
     assert solution.converged
     assert solution.cost < 1e-9 < solution.initial_cost
     np.testing.assert_allclose(solution.positions, helix.positions, atol=1e-6)
@@ -38,7 +45,7 @@ def test_the_cost_is_that_of_the_logarithm_of_the_error_rotation_first(helix):
     two = Links(*(getattr(link, name)[-1:].copy() for name in Links.__slots__))
     quats = np.array([[0, 0, 0, 1.0], geometry.exp(np.array([0, 0, np.pi / 2])).tolist()])
     graph = PoseGraph(np.array([[0, 0, 0.0], [0.1, 0.2, 1.3]]), quats, two, np.ones(2, bool))
-    solution = solve(graph, PLAIN)
+    solution = solve_pose_graph(graph, PLAIN)
     # A turn of π/2 about z and a shift of 1 along it: Log = [0, 0, π/2, 0, 0, 1].
     assert solution.chi2[0] == pytest.approx(3 * (np.pi / 2) ** 2 + 6, rel=1e-12)
     assert solution.cost == pytest.approx(0.5 * solution.chi2[0], rel=1e-12)
@@ -49,10 +56,10 @@ def test_a_false_link_is_rejected_and_named_but_not_where_it_is_trusted(disturbe
         disturbed.links, [3, 70], [0.0, 0, 0], [0, 0, 0, 1.0], disturbed.links.information[0]
     )
     graph = replace(disturbed, links=false)
-    assert solve(graph).rejected.tolist() == [len(false) - 1]
-    assert not len(solve(graph, PLAIN).rejected)
+    assert solve_pose_graph(graph).rejected.tolist() == [len(false) - 1]
+    assert not len(solve_pose_graph(graph, PLAIN).rejected)
     trusting = replace(graph, links=replace(false, trusted=np.ones(len(false), bool)))
-    assert not len(solve(trusting).rejected)
+    assert not len(solve_pose_graph(trusting).rejected)
 
 
 def test_a_prior_and_gravity_hold_the_graph_as_well_as_a_fixed_node(helix, disturbed):
@@ -64,11 +71,11 @@ def test_a_prior_and_gravity_hold_the_graph_as_well_as_a_fixed_node(helix, distu
     ups = geometry.rotate(geometry.inverse(helix.quats_xyzw), up)
     gravity = GravityTerms(nodes, ups, np.full(len(helix), 100.0))
     graph = replace(disturbed, links=links, fixed=np.zeros(len(helix), bool), gravity=gravity)
-    np.testing.assert_allclose(solve(graph).positions, helix.positions, atol=1e-5)
+    np.testing.assert_allclose(solve_pose_graph(graph).positions, helix.positions, atol=1e-5)
 
 
 def test_the_same_graph_gives_the_same_bytes(disturbed):
-    first, second = solve(disturbed), solve(disturbed)
+    first, second = solve_pose_graph(disturbed), solve_pose_graph(disturbed)
     assert first.positions.tobytes() == second.positions.tobytes()
     assert first.quats_xyzw.tobytes() == second.quats_xyzw.tobytes()
 
@@ -76,13 +83,13 @@ def test_the_same_graph_gives_the_same_bytes(disturbed):
 def test_a_node_that_nothing_holds_is_named(disturbed):
     graph = replace(disturbed, fixed=np.zeros(len(disturbed), bool))
     with pytest.raises(SingularSystemError, match="node 0 has no way over links"):
-        solve(graph)
+        solve_pose_graph(graph)
 
 
 def test_a_link_to_a_node_that_is_not_there_is_refused(disturbed):
     links = with_link(disturbed.links, [3, 96], [0.0, 0, 0], [0, 0, 0, 1.0], np.eye(6))
     with pytest.raises(ValueError, match="names node 96, but there are 96"):
-        solve(replace(disturbed, links=links))
+        solve_pose_graph(replace(disturbed, links=links))
 
 
 def test_an_indefinite_information_is_refused_with_its_row(helix):
@@ -96,4 +103,4 @@ def test_values_that_are_not_finite_are_refused_by_name(disturbed):
     positions = disturbed.positions.copy()
     positions[4, 1] = np.nan
     with pytest.raises(ValueError, match="positions: row 4 is not finite"):
-        solve(replace(disturbed, positions=positions))
+        solve_pose_graph(replace(disturbed, positions=positions))

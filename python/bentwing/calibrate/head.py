@@ -10,19 +10,26 @@ import numpy as np
 
 from bentwing.base.errors import BentwingError, EstimationError, PayloadError, RecordingError
 from bentwing.base.mount import MotorMount
+from bentwing.base.progress import as_progress
 from bentwing.calibrate.from_motion import calibrate_in_motion
 from bentwing.calibrate.motor_mount import calibrate_motor, place
 from bentwing.calibrate.outcome import Calibrated, with_motion, with_motor
 from bentwing.calibrate.revolution import find_stretches, read_course, read_revolutions
 from bentwing.calibrate.wall import best_wall
 from bentwing.recording.described import described_mount
+from bentwing.recording.payload import as_payload
+from bentwing.recording.preprocess.part import RecordingPart
+from bentwing.recording.recording import Recording
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
     from bentwing.base.progress import Progress
     from bentwing.calibrate.motor_mount import MotorCalibration
     from bentwing.calibrate.revolution import Course, Stretch
     from bentwing.calibrate.wall import WallSection
-    from bentwing.recording.preprocess import RecordingPart
+    from bentwing.recording.payload import PayloadLike
 
     FromRest = tuple[MotorCalibration, tuple[Stretch, ...], WallSection]
 
@@ -30,7 +37,15 @@ if TYPE_CHECKING:
 POOR = np.radians(0.02)
 
 
-def calibrate(part: RecordingPart, progress: Progress, *, threads: int | None = None) -> Calibrated:
+def calibrate(
+    paths: Path | str | Sequence[Path | str],
+    payload: PayloadLike,
+    *,
+    start: float | None = None,
+    duration: float | None = None,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> Calibrated:
     """Calibrate a sensor head by a recording.
 
     Revolutions of the motor with the carrier at rest tell where the lidar is on the motor; motion
@@ -38,15 +53,23 @@ def calibrate(part: RecordingPart, progress: Progress, *, threads: int | None = 
 
     Parameters
     ----------
-    part : the recording, with the payload as it is believed to be
-    progress : what to tell the user meanwhile
+    paths : one recording, or its consecutive parts
+    payload : the sensor head as it is believed to be, or the payload.yaml that describes it
+    start, duration : s, the part of the recording to use; default: all of it
     threads : of the estimator in motion
+    progress : shows the user how far it is; default: nothing
 
     Raises
     ------
     InputError, EstimationError
         The recording tells nothing; why, and how to record one that does.
     """
+    head, watch = as_payload(payload), as_progress(progress)
+    with Recording(paths, head) as recording:
+        return _calibrated(RecordingPart(recording, head, start, duration), watch, threads)
+
+
+def _calibrated(part: RecordingPart, progress: Progress, threads: int | None) -> Calibrated:
     with progress.stage("angles and inertial samples", part.length) as shown:
         course = read_course(part, shown)
     payload = part.payload

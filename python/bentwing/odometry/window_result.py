@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""What the registration of one window returns, and how later windows use it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from bentwing import _core
+from bentwing.base.value import Value
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from bentwing.base.calibration import Calibration
+    from bentwing.base.trajectory import Trajectory
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FixedView:
+    """Surfaces that a window has seen in `[start, stop)`, s, which do not move any more."""
+
+    start: float
+    stop: float
+    _surfels: _core.Surfels = field(repr=False)
+    _samples: _core.Samples = field(repr=False)
+    _globals: _core.Globals = field(repr=False)
+
+    def in_core(self) -> _core.FixedView:
+        """Return the view as the core takes it, with its search grids: milliseconds of work."""
+        return _core.FixedView([self._surfels], self.start, self.stop, self._samples, self._globals)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WindowResult(Value):
+    """The corrected trajectory of a window, and how well the points determine it.
+
+    Attributes
+    ----------
+    trajectory : the prior's poses, corrected
+    calibration : the slow states with their standard deviations; gravity as in the prior's map
+    n_surfels : pieces of surface found in the points
+    n_matches, n_fixed_matches : pairs of them within the window, and with the fixed views
+    inlier_share : share of the matches that agree within two standard deviations
+    residual_rms : of the matches, in units of the expected noise
+    translation_eigenvalues, rotation_eigenvalues : (3,) how well the matches see translation and
+        rotation, increasing; 1/3 each is even, near zero is not seen
+    iterations : how often the surfaces were matched anew
+    converged : whether the last correction was below the thresholds
+    """
+
+    trajectory: Trajectory
+    calibration: Calibration
+    n_surfels: int
+    n_matches: int
+    n_fixed_matches: int
+    inlier_share: float
+    residual_rms: float
+    translation_eigenvalues: NDArray[np.float64]
+    rotation_eigenvalues: NDArray[np.float64]
+    iterations: int
+    converged: bool
+    _surfels: _core.Surfels = field(repr=False, compare=False)
+    _samples: _core.Samples = field(repr=False, compare=False)
+    _globals: _core.Globals = field(repr=False, compare=False)
+
+    def fixed_view(self, start: float | None = None, stop: float | None = None) -> FixedView:
+        """Freeze the surfels of `[start, stop)`, s, in the map, for later windows to match with.
+
+        Raises
+        ------
+        ValueError
+            If `start` is not before `stop`.
+        """
+        start = float(self.trajectory.times[0]) if start is None else start
+        stop = float(self.trajectory.times[-1]) if stop is None else stop
+        if not start < stop:
+            msg = f"start: expected a time before stop, got {start} and {stop} s"
+            raise ValueError(msg)
+        return FixedView(start, stop, self._surfels, self._samples, self._globals)

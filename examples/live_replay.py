@@ -19,14 +19,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import bentwing
-from bentwing.base.trajectory import Trajectory, read_tum
-from bentwing.evaluate.trajectory import absolute_error
-from bentwing.odometry.continuous.settings import ContinuousSettings
+from bentwing import Trajectory, read_tum
+from bentwing.evaluate import absolute_error
+from bentwing.odometry import ContinuousSettings
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from bentwing.flight.live import StampedPose
+    from bentwing.flight import StampedPose
     from bentwing.recording import Batch
 
 POSE_RATE_HZ = 200.0

@@ -7,12 +7,17 @@ Public are the names in `__all__`, here and in the packages of `PACKAGES`. Every
 from __future__ import annotations
 
 import logging
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
-
-from bentwing.base.lazy import lazy
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from bentwing import calibrate as calibrate
+    from bentwing import closing as closing
+    from bentwing import evaluate as evaluate
+    from bentwing import flight as flight
+    from bentwing import map as map  # noqa: A004 - not at run time
+    from bentwing import odometry as odometry
+    from bentwing import recording as recording
+    from bentwing import simulate as simulate
     from bentwing.base.calibration import Calibration
     from bentwing.base.errors import (
         BentwingError,
@@ -39,6 +44,49 @@ if TYPE_CHECKING:
     from bentwing.run.run import Run
 
     __version__: str
+else:
+    from importlib import import_module
+
+    from bentwing.base.lazy import lazy
+
+    _load, _names = lazy(
+        __name__,
+        {
+            "base.calibration": ["Calibration"],
+            "base.errors": [
+                "BentwingError",
+                "DivergedError",
+                "EstimationError",
+                "InputError",
+                "NotEnoughDataError",
+                "PayloadError",
+                "RecordingError",
+                "SingularSystemError",
+                "UsageError",
+            ],
+            "base.estimate": ["Estimate"],
+            "base.mount": ["FixedMount", "MotorMount", "Mount", "Pose"],
+            "base.progress": ["Progress"],
+            "base.trajectory": ["Trajectory", "read_tum"],
+            "flight.live.odometry": ["Odometry"],
+            "odometry.window": ["register_window"],
+            "odometry.window_result": ["WindowResult"],
+            "recording.payload": ["Payload"],
+            "recording.recording": ["Recording"],
+            "run.merging.runs": ["Merged", "merge"],
+            "run.pipeline": ["map_recording"],
+            "run.run": ["Run"],
+        },
+    )
+
+    def __getattr__(name: str) -> object:
+        if name == "__version__":
+            return import_module("bentwing.base.provenance").bentwing_version()
+        return import_module(f"bentwing.{name}") if name in PACKAGES else _load(name)
+
+    def __dir__() -> list[str]:
+        return sorted([*_names(), *PACKAGES, "__version__"])
+
 
 PACKAGES = (
     "recording",
@@ -83,45 +131,5 @@ __all__ = [
     "register_window",
 ]
 
-_load, _names = lazy(
-    __name__,
-    {
-        "base.calibration": ["Calibration"],
-        "base.errors": [
-            "BentwingError",
-            "DivergedError",
-            "EstimationError",
-            "InputError",
-            "NotEnoughDataError",
-            "PayloadError",
-            "RecordingError",
-            "SingularSystemError",
-            "UsageError",
-        ],
-        "base.estimate": ["Estimate"],
-        "base.mount": ["FixedMount", "MotorMount", "Mount", "Pose"],
-        "base.progress": ["Progress"],
-        "base.trajectory": ["Trajectory", "read_tum"],
-        "flight.live.odometry": ["Odometry"],
-        "odometry.window": ["register_window"],
-        "odometry.window_result": ["WindowResult"],
-        "recording.payload": ["Payload"],
-        "recording.recording": ["Recording"],
-        "run.merging.runs": ["Merged", "merge"],
-        "run.pipeline": ["map_recording"],
-        "run.run": ["Run"],
-    },
-)
-
 # Who wants to read the log sets up its output; without one nothing is printed.
 logging.getLogger(__name__).addHandler(logging.NullHandler())
-
-
-def __getattr__(name: str) -> Any:  # noqa: ANN401 - whatever is public
-    if name == "__version__":
-        return import_module("bentwing.base.provenance").bentwing_version()
-    return import_module(f"bentwing.{name}") if name in PACKAGES else _load(name)
-
-
-def __dir__() -> list[str]:
-    return sorted([*_names(), *PACKAGES, "__version__"])

@@ -5,12 +5,21 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from bentwing.base.lazy import lazy
-
 if TYPE_CHECKING:
     from bentwing.calibrate.head import calibrate
     from bentwing.calibrate.inspection.inspect import Inspection, inspect
     from bentwing.calibrate.outcome import Calibrated
+else:
+    from bentwing.base.lazy import lazy
+
+    __getattr__, __dir__ = lazy(
+        __name__,
+        {
+            "calibrate.head": ["calibrate"],
+            "calibrate.inspection.inspect": ["Inspection", "inspect"],
+            "calibrate.outcome": ["Calibrated"],
+        },
+    )
 
 __all__ = [
     "Calibrated",
@@ -18,12 +27,3 @@ __all__ = [
     "calibrate",
     "inspect",
 ]
-
-__getattr__, __dir__ = lazy(
-    __name__,
-    {
-        "calibrate.head": ["calibrate"],
-        "calibrate.inspection.inspect": ["Inspection", "inspect"],
-        "calibrate.outcome": ["Calibrated"],
-    },
-)

@@ -5,8 +5,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from bentwing.base.lazy import lazy
-
 if TYPE_CHECKING:
     from bentwing.closing.georeference.settings import GeoreferenceMode, GeoreferenceSettings
     from bentwing.closing.places.cut import describe_run
@@ -22,6 +20,29 @@ if TYPE_CHECKING:
         Solution,
         SolveSettings,
         solve_pose_graph,
+    )
+else:
+    from bentwing.base.lazy import lazy
+
+    __getattr__, __dir__ = lazy(
+        __name__,
+        {
+            "closing.georeference.settings": ["GeoreferenceMode", "GeoreferenceSettings"],
+            "closing.places.cut": ["describe_run"],
+            "closing.places.from_run": ["places_of_cloud", "places_of_run"],
+            "closing.places.match": ["Candidate", "match_places"],
+            "closing.places.place": ["Place"],
+            "closing.places.settings": ["MatchSettings", "PlaceSettings"],
+            "closing.pose_graph.deform": ["deform_trajectory"],
+            "closing.pose_graph.g2o": ["G2oGraph", "read_g2o", "write_g2o"],
+            "closing.pose_graph.graph": ["Links", "PoseGraph"],
+            "closing.pose_graph.solve": [
+                "RobustSettings",
+                "Solution",
+                "SolveSettings",
+                "solve_pose_graph",
+            ],
+        },
     )
 
 __all__ = [
@@ -46,24 +67,3 @@ __all__ = [
     "solve_pose_graph",
     "write_g2o",
 ]
-
-__getattr__, __dir__ = lazy(
-    __name__,
-    {
-        "closing.georeference.settings": ["GeoreferenceMode", "GeoreferenceSettings"],
-        "closing.places.cut": ["describe_run"],
-        "closing.places.from_run": ["places_of_cloud", "places_of_run"],
-        "closing.places.match": ["Candidate", "match_places"],
-        "closing.places.place": ["Place"],
-        "closing.places.settings": ["MatchSettings", "PlaceSettings"],
-        "closing.pose_graph.deform": ["deform_trajectory"],
-        "closing.pose_graph.g2o": ["G2oGraph", "read_g2o", "write_g2o"],
-        "closing.pose_graph.graph": ["Links", "PoseGraph"],
-        "closing.pose_graph.solve": [
-            "RobustSettings",
-            "Solution",
-            "SolveSettings",
-            "solve_pose_graph",
-        ],
-    },
-)

@@ -5,12 +5,21 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from bentwing.base.lazy import lazy
-
 if TYPE_CHECKING:
     from bentwing.evaluate.evaluation import Evaluation, Question, evaluate
     from bentwing.evaluate.subject import Subject, find_subject
     from bentwing.evaluate.trajectory import AbsoluteError, Drift, absolute_error, drift
+else:
+    from bentwing.base.lazy import lazy
+
+    __getattr__, __dir__ = lazy(
+        __name__,
+        {
+            "evaluate.evaluation": ["Evaluation", "Question", "evaluate"],
+            "evaluate.subject": ["Subject", "find_subject"],
+            "evaluate.trajectory": ["AbsoluteError", "Drift", "absolute_error", "drift"],
+        },
+    )
 
 __all__ = [
     "AbsoluteError",
@@ -23,12 +32,3 @@ __all__ = [
     "evaluate",
     "find_subject",
 ]
-
-__getattr__, __dir__ = lazy(
-    __name__,
-    {
-        "evaluate.evaluation": ["Evaluation", "Question", "evaluate"],
-        "evaluate.subject": ["Subject", "find_subject"],
-        "evaluate.trajectory": ["AbsoluteError", "Drift", "absolute_error", "drift"],
-    },
-)

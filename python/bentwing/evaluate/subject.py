@@ -5,13 +5,11 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 from bentwing.base.errors import UsageError
 from bentwing.map.read import MAP_SUFFIXES
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +33,7 @@ class Subject:
         return [path for path in (self.trajectory, self.odometry, self.map_path) if path]
 
 
-def find_subject(path: Path) -> Subject:
+def find_subject(path: Path | str) -> Subject:
     """Find trajectory.txt, odometry.txt and map.* in a folder, or take a single file.
 
     Raises
@@ -43,6 +41,7 @@ def find_subject(path: Path) -> Subject:
     UsageError
         If there is none of them.
     """
+    path = Path(path)
     if path.is_file():
         is_map = path.suffix.lower() in MAP_SUFFIXES
         return Subject(None if is_map else path, None, path if is_map else None)

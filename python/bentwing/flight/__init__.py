@@ -5,8 +5,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from bentwing.base.lazy import lazy
-
 if TYPE_CHECKING:
     from bentwing.flight.control.bumper import (
         BumperCommand,
@@ -24,6 +22,30 @@ if TYPE_CHECKING:
     from bentwing.flight.live.status import Status
     from bentwing.flight.plan.plan import Intent, Plan, plan_flight
     from bentwing.odometry.stall import Stall, StallWatch
+else:
+    from bentwing.base.lazy import lazy
+
+    __getattr__, __dir__ = lazy(
+        __name__,
+        {
+            "flight.control.bumper": [
+                "BumperCommand",
+                "BumperSettings",
+                "CarrierState",
+                "VirtualBumper",
+            ],
+            "flight.control.link": ["FlightLink"],
+            "flight.control.mavlink": ["MavlinkLink"],
+            "flight.control.spin_controller": ["SpinCommand", "SpinController", "SpinSettings"],
+            "flight.control.spin_target": ["SpinTarget"],
+            "flight.live.live_map": ["MapUpdate"],
+            "flight.live.odometry": ["Odometry"],
+            "flight.live.prediction": ["StampedPose"],
+            "flight.live.status": ["Status"],
+            "flight.plan.plan": ["Intent", "Plan", "plan_flight"],
+            "odometry.stall": ["Stall", "StallWatch"],
+        },
+    )
 
 __all__ = [
     "BumperCommand",
@@ -46,25 +68,3 @@ __all__ = [
     "VirtualBumper",
     "plan_flight",
 ]
-
-__getattr__, __dir__ = lazy(
-    __name__,
-    {
-        "flight.control.bumper": [
-            "BumperCommand",
-            "BumperSettings",
-            "CarrierState",
-            "VirtualBumper",
-        ],
-        "flight.control.link": ["FlightLink"],
-        "flight.control.mavlink": ["MavlinkLink"],
-        "flight.control.spin_controller": ["SpinCommand", "SpinController", "SpinSettings"],
-        "flight.control.spin_target": ["SpinTarget"],
-        "flight.live.live_map": ["MapUpdate"],
-        "flight.live.odometry": ["Odometry"],
-        "flight.live.prediction": ["StampedPose"],
-        "flight.live.status": ["Status"],
-        "flight.plan.plan": ["Intent", "Plan", "plan_flight"],
-        "odometry.stall": ["Stall", "StallWatch"],
-    },
-)

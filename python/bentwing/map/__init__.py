@@ -5,12 +5,21 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from bentwing.base.lazy import lazy
-
 if TYPE_CHECKING:
     from bentwing.map.clean import CleanSettings
     from bentwing.map.read import MapPart, read_parts, read_points
     from bentwing.map.writer import MAP_FORMATS, MapFormat
+else:
+    from bentwing.base.lazy import lazy
+
+    __getattr__, __dir__ = lazy(
+        __name__,
+        {
+            "map.clean": ["CleanSettings"],
+            "map.read": ["MapPart", "read_parts", "read_points"],
+            "map.writer": ["MAP_FORMATS", "MapFormat"],
+        },
+    )
 
 __all__ = [
     "MAP_FORMATS",
@@ -20,12 +29,3 @@ __all__ = [
     "read_parts",
     "read_points",
 ]
-
-__getattr__, __dir__ = lazy(
-    __name__,
-    {
-        "map.clean": ["CleanSettings"],
-        "map.read": ["MapPart", "read_parts", "read_points"],
-        "map.writer": ["MAP_FORMATS", "MapFormat"],
-    },
-)

@@ -36,7 +36,7 @@ class MapPart(Value):
     times: NDArray[np.float64] | None
 
 
-def read_points(path: Path) -> NDArray[np.float64]:
+def read_points(path: Path | str) -> NDArray[np.float64]:
     """Read the coordinates of a whole map; see `read_parts`.
 
     Returns
@@ -47,7 +47,9 @@ def read_points(path: Path) -> NDArray[np.float64]:
     return np.concatenate(parts) if parts else np.empty((0, 3))
 
 
-def read_parts(path: Path, georeference: Mapping[str, Any] | None = None) -> Iterator[MapPart]:
+def read_parts(
+    path: Path | str, georeference: Mapping[str, Any] | None = None
+) -> Iterator[MapPart]:
     """Read a .laz, .las, .ply, .pcd or .e57 file in parts that fit into memory.
 
     Parameters

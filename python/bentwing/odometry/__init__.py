@@ -5,8 +5,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from bentwing.base.lazy import lazy
-
 if TYPE_CHECKING:
     from bentwing.odometry.continuous.estimator import Continuous
     from bentwing.odometry.continuous.settings import (
@@ -28,6 +26,34 @@ if TYPE_CHECKING:
     )
     from bentwing.odometry.window import register_window
     from bentwing.odometry.window_result import FixedView, WindowResult
+else:
+    from bentwing.base.lazy import lazy
+
+    __getattr__, __dir__ = lazy(
+        __name__,
+        {
+            "odometry.continuous.estimator": ["Continuous"],
+            "odometry.continuous.settings": [
+                "ContinuousSettings",
+                "RegistrationSettings",
+                "SurfelSettings",
+            ],
+            "odometry.interface": ["Estimator"],
+            "odometry.kalman.estimator": ["Kalman"],
+            "odometry.kalman.settings": ["KalmanSettings"],
+            "odometry.ndt.estimator": ["Ndt"],
+            "odometry.ndt.settings": ["NdtSettings"],
+            "odometry.registry": [
+                "ESTIMATORS",
+                "EstimatorName",
+                "EstimatorSettings",
+                "create",
+                "require_estimator",
+            ],
+            "odometry.window": ["register_window"],
+            "odometry.window_result": ["FixedView", "WindowResult"],
+        },
+    )
 
 __all__ = [
     "ESTIMATORS",
@@ -48,23 +74,3 @@ __all__ = [
     "register_window",
     "require_estimator",
 ]
-
-__getattr__, __dir__ = lazy(
-    __name__,
-    {
-        "odometry.continuous.estimator": ["Continuous"],
-        "odometry.continuous.settings": [
-            "ContinuousSettings",
-            "RegistrationSettings",
-            "SurfelSettings",
-        ],
-        "odometry.interface": ["Estimator"],
-        "odometry.kalman.estimator": ["Kalman"],
-        "odometry.kalman.settings": ["KalmanSettings"],
-        "odometry.ndt.estimator": ["Ndt"],
-        "odometry.ndt.settings": ["NdtSettings"],
-        "odometry.registry": ["ESTIMATORS", "EstimatorName", "EstimatorSettings", "create", "require_estimator"],
-        "odometry.window": ["register_window"],
-        "odometry.window_result": ["FixedView", "WindowResult"],
-    },
-)

@@ -5,8 +5,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from bentwing.base.lazy import lazy
-
 if TYPE_CHECKING:
     from bentwing.base.clock import Clock
     from bentwing.recording.batches import Batch, EncoderBatch, ImuBatch, LidarBatch
@@ -23,6 +21,29 @@ if TYPE_CHECKING:
         Transform,
     )
     from bentwing.recording.recording import Recording
+else:
+    from bentwing.base.lazy import lazy
+
+    __getattr__, __dir__ = lazy(
+        __name__,
+        {
+            "base.clock": ["Clock"],
+            "recording.batches": ["Batch", "EncoderBatch", "ImuBatch", "LidarBatch"],
+            "recording.lidar_kinds": ["LidarKind"],
+            "recording.payload": [
+                "Box",
+                "Encoder",
+                "Gnss",
+                "Imu",
+                "Lidar",
+                "Payload",
+                "PayloadLike",
+                "SelfHit",
+                "Transform",
+            ],
+            "recording.recording": ["Recording"],
+        },
+    )
 
 __all__ = [
     "Batch",
@@ -42,24 +63,3 @@ __all__ = [
     "SelfHit",
     "Transform",
 ]
-
-__getattr__, __dir__ = lazy(
-    __name__,
-    {
-        "base.clock": ["Clock"],
-        "recording.batches": ["Batch", "EncoderBatch", "ImuBatch", "LidarBatch"],
-        "recording.lidar_kinds": ["LidarKind"],
-        "recording.payload": [
-            "Box",
-            "Encoder",
-            "Gnss",
-            "Imu",
-            "Lidar",
-            "Payload",
-            "PayloadLike",
-            "SelfHit",
-            "Transform",
-        ],
-        "recording.recording": ["Recording"],
-    },
-)

@@ -8,24 +8,24 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from bentwing.base.lazy import lazy
-
 if TYPE_CHECKING:
     from bentwing.simulate.scenario import Scenario
     from bentwing.simulate.simulation import simulate
     from bentwing.simulate.write import SimulatedRecording
+else:
+    from bentwing.base.lazy import lazy
+
+    __getattr__, __dir__ = lazy(
+        __name__,
+        {
+            "simulate.scenario": ["Scenario"],
+            "simulate.simulation": ["simulate"],
+            "simulate.write": ["SimulatedRecording"],
+        },
+    )
 
 __all__ = [
     "Scenario",
     "SimulatedRecording",
     "simulate",
 ]
-
-__getattr__, __dir__ = lazy(
-    __name__,
-    {
-        "simulate.scenario": ["Scenario"],
-        "simulate.simulation": ["simulate"],
-        "simulate.write": ["SimulatedRecording"],
-    },
-)

@@ -82,7 +82,7 @@ def map_of_run(folder: Path) -> RunMap:
     return RunMap(path, trajectory, segments, record.get("georeference"), origin)
 
 
-def places_of_run(folder: Path, settings: PlaceSettings | None = None) -> list[Place]:
+def places_of_run(folder: Path | str, settings: PlaceSettings | None = None) -> list[Place]:
     """Describe the places of a run folder: its map's points, and its trajectory.
 
     Raises
@@ -92,7 +92,7 @@ def places_of_run(folder: Path, settings: PlaceSettings | None = None) -> list[P
     InputError
         If its trajectory or its map cannot be read.
     """
-    run = map_of_run(folder)
+    run = map_of_run(Path(folder))
     poses = run.trajectory
     spans = run.segments or [(float(poses.times[0]), float(poses.times[-1]))]
     stream = PartStream(poses, spans, settings)
@@ -105,7 +105,7 @@ def places_of_run(folder: Path, settings: PlaceSettings | None = None) -> list[P
 
 
 def places_of_cloud(
-    path: Path,
+    path: Path | str,
     settings: PlaceSettings | None = None,
     *,
     shift: NDArray[np.float64] | None = None,

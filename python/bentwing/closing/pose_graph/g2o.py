@@ -52,7 +52,7 @@ class G2oGraph:
     n_repaired: int
 
 
-def read_g2o(path: Path) -> G2oGraph:
+def read_g2o(path: Path | str) -> G2oGraph:
     """Read a pose graph.
 
     Parameters
@@ -173,7 +173,7 @@ class _Lines:
         raise InputError(msg)
 
 
-def write_g2o(path: Path, graph: PoseGraph, ids: NDArray[np.int64] | None = None) -> None:
+def write_g2o(path: Path | str, graph: PoseGraph, ids: NDArray[np.int64] | None = None) -> None:
     """Write a pose graph, atomically; the numbers are exact.
 
     Parameters

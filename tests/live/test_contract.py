@@ -242,7 +242,7 @@ def test_without_points_the_status_says_that_the_imu_is_alone(new, flight):
     assert odometry.pose().predicted > 3.0
 
 
-def test_a_failure_is_told_to_who_feeds_and_to_who_reads(new, flight, monkeypatch):
+def test_a_failure_is_told_to_who_feeds_and_to_who_reads(new, flight, monkeypatch, caplog):
     odometry = new()
     for piece in until(flight.pieces, 8.0):
         odometry.feed(piece)
@@ -260,6 +260,7 @@ def test_a_failure_is_told_to_who_feeds_and_to_who_reads(new, flight, monkeypatc
     for call in (odometry.pose, odometry.finish, lambda: odometry.feed(flight.pieces[-1])):
         with pytest.raises(DivergedError, match="1000 m"):
             call()
+    assert "live odometry has failed" in caplog.messages
     assert len(odometry.trajectory.times)  # what was estimated until then
 
 

@@ -123,3 +123,13 @@ def loaded(code):
 )
 def test_errors_come_through_pickles(error):
     assert str(pickle.loads(pickle.dumps(error("what was found")))) == "what was found"
+
+
+def test_the_log_is_silent_until_somebody_asks_for_it():
+    code = "import bentwing, logging; logging.getLogger('bentwing.closing').warning('dropped')"
+    speak = f"import logging; logging.basicConfig(); {code}"
+    for source, said in ((code, ""), (speak, "WARNING:bentwing.closing:dropped\n")):
+        answer = subprocess.run(
+            [sys.executable, "-c", source], check=True, capture_output=True, text=True
+        )
+        assert answer.stdout + answer.stderr == said

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
     from bentwing.recording import ImuBatch
     from bentwing.recording.payload import Imu
     from bentwing.recording.preprocess import StaticStart
+
+_log = logging.getLogger(__name__)
 
 # A start in motion takes its first attitude from the mean force over this time, s: long enough
 # for the accelerations of a flight to average out.
@@ -66,10 +69,14 @@ def find_start(imu: ImuBatch, noise: Imu) -> Start:
         accel_bias_walk=noise.accel_bias_walk,
     )
     if static is None:
+        _log.info(
+            "no rest within the first %.1f s: the estimate begins in motion", np.ptp(imu.times)
+        )
         first = imu.times < imu.times[0] + MOVING_MEAN
         up = imu.accel[first].mean(axis=0)
         rate = imu.gyro[imu.times < imu.times[0] + FIRST_RATE].mean(axis=0)
         return Start(None, attitude_of(up), rate, np.zeros(3), np.zeros(3), float(imu.times[0]))
+    _log.info("the estimate begins after a rest from %.2f to %.2f s", static.start, static.end)
     # Only the part of the bias along gravity shows at rest; the rest is in the attitude.
     force = static.accel_mean
     bias = force * (1.0 - STANDARD_GRAVITY / float(np.linalg.norm(force)))

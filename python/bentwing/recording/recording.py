@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -30,6 +31,8 @@ if TYPE_CHECKING:
     from bentwing.recording.containers.scanned import TopicInfo
     from bentwing.recording.payload import PayloadLike
     from bentwing.recording.streams import Stream
+
+_log = logging.getLogger(__name__)
 
 SEEK_MARGIN = 5.0  # s by which messages may reach the recorder late
 
@@ -79,6 +82,8 @@ class Recording:
         for role, topic in found.items():
             self._peeks[role] = self._peek(role, topic, is_alone=is_alone)
         self.clock = Clock(min(found.first_ns for found in self._peeks.values()))
+        for role, peeked in self._peeks.items():
+            _log.info("%s: %s (%s)", role, peeked.topic.name, peeked.topic.type)
         if self.strict:
             self._check_fitness()
 
@@ -255,6 +260,8 @@ class Recording:
             if (part := trimmed(batch, begin, end)) is not None:
                 n_points += hasattr(part, "points")
                 yield part
+        if self.counts:
+            _log.info("read and dropped: %s", dict(self.counts))
         if self.strict and n_points == 0:
             self._refuse_empty(begin, end)
 

@@ -48,6 +48,31 @@ def test_a_head_comes_out_whole_in_every_container(tmp_path, ros1, ros2, head_en
     }  # fmt: skip
 
 
+def test_what_is_read_is_logged(tmp_path, ros1, head_entries, caplog):
+    path = ros1.write(tmp_path / "head.bag", head_entries(ros1))
+    with caplog.at_level("INFO", logger="bentwing"):
+        read(path)
+    assert "lidar: /scan (sensor_msgs/msg/LaserScan)" in caplog.messages
+    assert any("'lidar.returns': 8000" in message for message in caplog.messages)
+
+
+@pytest.mark.parametrize("given", [3, {"imu": None}])
+def test_what_is_no_payload_is_refused_with_what_is_one(tmp_path, given):
+    sentence = (
+        f"payload: expected a Payload, got {type(given).__name__}; give the path of a payload"
+    )
+    with pytest.raises(TypeError, match=sentence):
+        Recording(tmp_path / "any.bag", given)
+
+
+def test_a_payload_may_be_given_by_its_file(tmp_path, ros1, head_entries):
+    bag = ros1.write(tmp_path / "head.bag", head_entries(ros1))
+    path = tmp_path / "payload.yaml"
+    path.write_text("T_imu_lidar: {}\n")
+    with Recording(bag, path) as by_path, Recording(bag, str(path)) as by_text:
+        assert by_path.payload == by_text.payload == Payload.load(path)
+
+
 @pytest.mark.parametrize("suffix", [".mcap", ".db3"])
 def test_a_bare_file_of_a_ros2_bag_is_read(tmp_path, ros2, head_entries, suffix):
     folder = ros2.write(tmp_path / "head", head_entries(ros2), kind=suffix[1:])

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -32,6 +33,8 @@ if TYPE_CHECKING:
 
     from bentwing.base.estimate import Estimate
     from bentwing.recording import Batch, Payload
+
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,6 +135,7 @@ def close_loops(
                 "the trajectory was not registered with the map, its places alone say where it is"
             )
         warnings = [f"{what}: {found.failure}"]
+        _log.warning(warnings[0])
     return Closed(found.estimates[0], found.record, warnings)
 
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -27,6 +28,8 @@ _WORTH_REFINING = 0.6  # agreement after the coarse alignment
 # Transforms closer than this, m, in the middle of a place and so far from it, m, are one.
 _SAME, _ARM = 0.1, 10.0
 _FAR = "too few surfels are near each other"
+
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,6 +96,8 @@ def match_places(
                 if likely[i, j]
                 else Candidate(i, j, i_votes, _too_few(i_votes, settings))
             )
+    n_accepted = sum(candidate.accepted for candidate in found)
+    _log.info("of %d pairs of places with votes %d are accepted", len(found), n_accepted)
     return found
 
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass
 from threading import Lock
 from typing import TYPE_CHECKING
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
 
     from bentwing.odometry.buffer import BatchBuffer
     from bentwing.odometry.interface import Registered
+
+_log = logging.getLogger(__name__)
 
 # More points than this from one window add nothing to a map of one point per voxel.
 POINTS_PER_WINDOW = 200_000
@@ -97,6 +100,7 @@ class LiveMap:
 
     def _coarsen(self) -> None:
         self.spacing *= 2.0
+        _log.info("more than %d points: the map keeps one per %g m", self._max_points, self.spacing)
         self._voxels = VoxelSet()
         points = self.points()
         kept = points[self._voxels.add(voxel_keys(points.astype(np.float64), self.spacing))]

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import logging
 import weakref
 from collections import Counter
 from functools import partial
@@ -37,6 +38,8 @@ if TYPE_CHECKING:
     from bentwing.odometry import EstimatorName, EstimatorSettings
     from bentwing.recording.batches import Batch
     from bentwing.recording.payload import PayloadLike
+
+_log = logging.getLogger(__name__)
 
 
 class Odometry:
@@ -316,6 +319,10 @@ class Odometry:
         if not len(batch.times):
             return
         if isinstance(batch, LidarBatch) and not self._has_time(batch):
+            if not self._dropped["live.points_dropped"]:
+                _log.warning(
+                    "registration falls behind: scans are left out from %.2f s on", batch.times[0]
+                )
             self._dropped["live.points_dropped"] += len(batch.times)
         else:
             self._worker.put(batch)

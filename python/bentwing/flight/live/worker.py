@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections import deque
 from threading import Condition, Thread, current_thread
 from typing import TYPE_CHECKING
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
     from bentwing.odometry.interface import Estimator
     from bentwing.recording.batches import Batch
     from bentwing.recording.preprocess import Preprocessing
+
+_log = logging.getLogger(__name__)
 
 # The search for the start looks at all that was fed; new data is worth it this often, s.
 START_INTERVAL = 0.25
@@ -111,6 +114,7 @@ class Worker:
                 self._register(finishing=True)
         except BaseException as error:  # raised in the threads that feed and read
             self.error = error
+            _log.error("live odometry has failed", exc_info=error)
         finally:
             with self._changed:
                 self._idle = True

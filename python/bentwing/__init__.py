@@ -6,7 +6,6 @@ Public are the names in `__all__`, here and in the packages of `PACKAGES`. Every
 
 from __future__ import annotations
 
-import logging
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -130,6 +129,3 @@ __all__ = [
     "read_tum",
     "register_window",
 ]
-
-# Who wants to read the log sets up its output; without one nothing is printed.
-logging.getLogger(__name__).addHandler(logging.NullHandler())

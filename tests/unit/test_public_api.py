@@ -126,9 +126,9 @@ def test_errors_come_through_pickles(error):
 
 
 def test_the_log_is_silent_until_somebody_asks_for_it():
-    code = "import bentwing, logging; logging.getLogger('bentwing.closing').warning('dropped')"
+    code = "from bentwing.base.log import get_logger; get_logger('bentwing.map').warning('dropped')"
     speak = f"import logging; logging.basicConfig(); {code}"
-    for source, said in ((code, ""), (speak, "WARNING:bentwing.closing:dropped\n")):
+    for source, said in ((code, ""), (speak, "WARNING:bentwing.map:dropped\n")):
         answer = subprocess.run(
             [sys.executable, "-c", source], check=True, capture_output=True, text=True
         )

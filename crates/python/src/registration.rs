@@ -153,13 +153,8 @@ impl Surfels {
 
     /// For copies and pickles.
     fn __getnewargs__<'py>(&self, py: Python<'py>) -> PyResult<Columns<'py>> {
-        // A covariance is symmetric: its columns are its rows.
-        let covariances: Vec<[f64; 9]> = self
-            .0
-            .covariances
-            .iter()
-            .map(|c| std::array::from_fn(|i| c.as_slice()[i]))
-            .collect();
+        let by_rows = |c: &Matrix3<f64>| std::array::from_fn(|i| c[(i / 3, i % 3)]);
+        let covariances: Vec<[f64; 9]> = self.0.covariances.iter().map(by_rows).collect();
         Ok((
             self.0.voxel_sizes.clone(),
             self.0.level_starts.clone(),

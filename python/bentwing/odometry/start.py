@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import logging
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -11,6 +10,7 @@ import numpy as np
 
 from bentwing.base import geometry
 from bentwing.base.calibration import STANDARD_GRAVITY
+from bentwing.base.log import get_logger
 from bentwing.recording.preprocess import find_static_start
 from bentwing.recording.preprocess.static_init import level_attitude
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from bentwing.recording.payload import Imu
     from bentwing.recording.preprocess import StaticStart
 
-_log = logging.getLogger(__name__)
+_log = get_logger(__name__)
 
 # A start in motion takes its first attitude from the mean force over this time, s: long enough
 # for the accelerations of a flight to average out.

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import logging
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,6 +11,7 @@ from bentwing import _core
 from bentwing.base.arguments import instance, thread_count
 from bentwing.base.calibration import Calibration
 from bentwing.base.errors import NotEnoughDataError
+from bentwing.base.log import get_logger
 from bentwing.base.trajectory import Trajectory
 from bentwing.odometry.continuous.core_settings import CoreSettings
 from bentwing.odometry.continuous.settings import ContinuousSettings
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from bentwing.recording.batches import ImuBatch
     from bentwing.recording.payload import Payload, PayloadLike
 
-_log = logging.getLogger(__name__)
+_log = get_logger(__name__)
 
 
 def register_window(

@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
-import logging
 from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bentwing.base.clock import NS_PER_S, Clock
 from bentwing.base.errors import PayloadError, RecordingError
+from bentwing.base.log import get_logger
 from bentwing.recording import imu_units, problems
 from bentwing.recording.containers.source import open_source
 from bentwing.recording.fixes import Fixes, read_fixes
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from bentwing.recording.payload import PayloadLike
     from bentwing.recording.streams import Stream
 
-_log = logging.getLogger(__name__)
+_log = get_logger(__name__)
 
 SEEK_MARGIN = 5.0  # s by which messages may reach the recorder late
 

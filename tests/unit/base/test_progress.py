@@ -4,7 +4,13 @@ import io
 import pytest
 
 from bentwing.base import progress
-from bentwing.base.progress import BarProgress, LineProgress, Progress, create_progress
+from bentwing.base.progress import (
+    BarProgress,
+    LineProgress,
+    Progress,
+    as_progress,
+    create_progress,
+)
 
 
 class Clock:
@@ -68,3 +74,11 @@ def test_a_bar_reaches_its_end_and_goes_to_standard_error(capsys):
 def test_errors_pass_through_a_stage(kind):
     with pytest.raises(KeyboardInterrupt), kind().stage("map", 1.0):
         raise KeyboardInterrupt
+
+
+def test_no_progress_is_one_that_says_nothing_and_a_function_is_refused():
+    given = LineProgress()
+    assert as_progress(given) is given
+    assert type(as_progress(None)) is Progress
+    with pytest.raises(TypeError, match="progress: expected a Progress, got builtin_function"):
+        as_progress(print)

@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
-import logging
 import time
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from bentwing import _core
 from bentwing.base.errors import EstimationError
+from bentwing.base.log import get_logger
 from bentwing.base.mount import MotorMount
 from bentwing.closing.global_registration.biases import drift_of, has_inertial_states
 from bentwing.closing.global_registration.budget import HELD, Budget
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from bentwing.base.estimate import Estimate
     from bentwing.recording import Batch, Payload
 
-_log = logging.getLogger(__name__)
+_log = get_logger(__name__)
 
 
 @dataclass(frozen=True, slots=True)

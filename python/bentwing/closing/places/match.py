@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
-import logging
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial import cKDTree
 
+from bentwing.base.log import get_logger
 from bentwing.closing.places.consensus import Hypothesis, hypotheses
 from bentwing.closing.places.metric import Metric, default_metric
 from bentwing.closing.places.refine import COARSE, FINE, Alignment, refine
@@ -29,7 +29,7 @@ _WORTH_REFINING = 0.6  # agreement after the coarse alignment
 _SAME, _ARM = 0.1, 10.0
 _FAR = "too few surfels are near each other"
 
-_log = logging.getLogger(__name__)
+_log = get_logger(__name__)
 
 
 @dataclass(frozen=True, slots=True)

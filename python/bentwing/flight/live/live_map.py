@@ -3,15 +3,15 @@
 
 from __future__ import annotations
 
-import logging
 from dataclasses import dataclass
 from threading import Lock
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing.base.voxels import VoxelSet, voxel_keys
+from bentwing.base.log import get_logger
 from bentwing.base.value import Value
+from bentwing.base.voxels import VoxelSet, voxel_keys
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from bentwing.odometry.buffer import BatchBuffer
     from bentwing.odometry.interface import Registered
 
-_log = logging.getLogger(__name__)
+_log = get_logger(__name__)
 
 # More points than this from one window add nothing to a map of one point per voxel.
 POINTS_PER_WINDOW = 200_000

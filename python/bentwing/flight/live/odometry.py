@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import logging
 import weakref
 from collections import Counter
 from functools import partial
@@ -14,6 +13,7 @@ import numpy as np
 
 from bentwing.base.arguments import thread_count
 from bentwing.base.errors import UsageError
+from bentwing.base.log import get_logger
 from bentwing.flight.control import StallWatch
 from bentwing.flight.live.backlog import Backlog
 from bentwing.flight.live.inputs import InputOrder
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from bentwing.recording.batches import Batch
     from bentwing.recording.payload import PayloadLike
 
-_log = logging.getLogger(__name__)
+_log = get_logger(__name__)
 
 
 class Odometry:

@@ -3,12 +3,12 @@
 
 from __future__ import annotations
 
-import logging
 from collections import deque
 from threading import Condition, Thread, current_thread
 from typing import TYPE_CHECKING
 
 from bentwing.base.errors import UsageError
+from bentwing.base.log import get_logger
 from bentwing.flight.live.state import REST, Published
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from bentwing.recording.batches import Batch
     from bentwing.recording.preprocess import Preprocessing
 
-_log = logging.getLogger(__name__)
+_log = get_logger(__name__)
 
 # The search for the start looks at all that was fed; new data is worth it this often, s.
 START_INTERVAL = 0.25

@@ -9,7 +9,7 @@ radians, quaternions x y z w; `threads` 0 means one per core, and no result depe
 
 from collections.abc import Sequence
 from os import PathLike
-from typing import TypeAlias, final
+from typing import Any, TypeAlias, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -238,6 +238,7 @@ class Globals:
         encoder_zero: float = 0.0,
         T_motor_lidar: _Transform | None = None,
     ) -> Globals: ...
+    def __getnewargs_ex__(self) -> tuple[tuple[_Transform], dict[str, Any]]: ...
     @property
     def latency(self) -> float:
         """Lidar stamps minus IMU clock, s."""

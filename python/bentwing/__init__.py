@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from bentwing import odometry as odometry
     from bentwing import recording as recording
     from bentwing import simulate as simulate
+    from bentwing.base.breaks import Break
     from bentwing.base.calibration import Calibration
     from bentwing.base.errors import (
         BentwingError,
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from bentwing.base.mount import FixedMount, MotorMount, Mount, Pose
     from bentwing.base.progress import Progress
     from bentwing.base.trajectory import Trajectory, read_tum
+    from bentwing.base.window_record import WindowRecord
     from bentwing.flight.live.odometry import Odometry
     from bentwing.odometry.window import register_window
     from bentwing.odometry.window_result import WindowResult
@@ -51,6 +53,7 @@ else:
     _load, _names = lazy(
         __name__,
         {
+            "base.breaks": ["Break"],
             "base.calibration": ["Calibration"],
             "base.errors": [
                 "BentwingError",
@@ -67,6 +70,7 @@ else:
             "base.mount": ["FixedMount", "MotorMount", "Mount", "Pose"],
             "base.progress": ["Progress"],
             "base.trajectory": ["Trajectory", "read_tum"],
+            "base.window_record": ["WindowRecord"],
             "flight.live.odometry": ["Odometry"],
             "odometry.window": ["register_window"],
             "odometry.window_result": ["WindowResult"],
@@ -101,6 +105,7 @@ PACKAGES = (
 
 __all__ = [
     "BentwingError",
+    "Break",
     "Calibration",
     "DivergedError",
     "Estimate",
@@ -122,6 +127,7 @@ __all__ = [
     "SingularSystemError",
     "Trajectory",
     "UsageError",
+    "WindowRecord",
     "WindowResult",
     "__version__",
     "map_recording",

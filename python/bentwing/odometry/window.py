@@ -119,6 +119,16 @@ def register_window(
         threads=n_threads,
     )
     _require_matches(found, seen)
+    return _result(found, surfels, prior, start, known)
+
+
+def _result(
+    found: _core.Registration,
+    surfels: _core.Surfels,
+    prior: Trajectory,
+    start: Calibration,
+    known: SlowStatePrior,
+) -> WindowResult:
     return WindowResult(
         trajectory=Trajectory(prior.times, found.samples.positions, found.samples.quats_xyzw),
         calibration=Calibration(

@@ -8,8 +8,7 @@ use bentwing_registration::{FixedView as RustView, GlobalPrior, Initial, N_GLOBA
 use bentwing_surfels::{Points, SurfelSet};
 use nalgebra::Matrix3;
 use numpy::{
-    PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods,
-    ToPyArray,
+    PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods, ToPyArray,
 };
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;

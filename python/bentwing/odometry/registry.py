@@ -5,12 +5,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
+from bentwing.base.arguments import instance
 from bentwing.base.errors import UsageError
 from bentwing.odometry.continuous.estimator import Continuous
 from bentwing.odometry.continuous.settings import ContinuousSettings
 from bentwing.odometry.kalman import Kalman, KalmanSettings
 from bentwing.odometry.ndt import Ndt, NdtSettings
-from bentwing.recording.payload import Payload
+from bentwing.recording.payload import as_payload
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from pydantic import BaseModel
 
     from bentwing.odometry.interface import Estimator
+    from bentwing.recording.payload import PayloadLike
 
 EstimatorName: TypeAlias = Literal["continuous", "kalman", "ndt"]
 EstimatorSettings: TypeAlias = ContinuousSettings | KalmanSettings | NdtSettings
@@ -29,8 +31,8 @@ ESTIMATORS: dict[EstimatorName, tuple[Callable[..., Estimator], type[BaseModel]]
 
 
 def create(
-    name: str,
-    payload: Payload,
+    name: EstimatorName,
+    payload: PayloadLike,
     settings: EstimatorSettings | None = None,
     threads: int | None = None,
 ) -> Estimator:
@@ -39,7 +41,7 @@ def create(
     Parameters
     ----------
     name : one of `ESTIMATORS`
-    payload : the sensor head
+    payload : the sensor head, or the payload.yaml that describes it
     settings : of the model that belongs to the name; default: its defaults
     threads : default: all cores
 
@@ -52,10 +54,9 @@ def create(
     """
     require_estimator(name)
     engine, model = ESTIMATORS[name]
-    _require_type("payload", payload, Payload, name)
     if settings is not None:
-        _require_type("settings", settings, model, name)
-    return engine(payload, settings, threads)
+        instance("settings", settings, model, f"the estimator {name!r} has settings of its own")
+    return engine(as_payload(payload), settings, threads)
 
 
 def require_estimator(name: str) -> None:
@@ -64,10 +65,3 @@ def require_estimator(name: str) -> None:
         *others, last = ESTIMATORS
         msg = f"estimator {name!r} is not known; choose {', '.join(others)} or {last}"
         raise UsageError(msg)
-
-
-def _require_type(argument: str, value: object, expected: type[BaseModel], name: str) -> None:
-    if not isinstance(value, expected):
-        found = value if isinstance(value, (dict, str)) else type(value).__name__
-        msg = f"{argument}: expected {expected.__name__} for the estimator {name!r}, got {found!r}"
-        raise TypeError(msg)

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bentwing.base.estimate import Estimate
-    from bentwing.odometry.interface import Estimator
+    from bentwing.odometry import Estimator, EstimatorName
 
     Array = NDArray[np.float64]
 
@@ -40,7 +40,7 @@ class Trial:
     """An algorithm: estimator and settings (None: the defaults), by its name in the tables."""
 
     name: str
-    estimator: str
+    estimator: EstimatorName
     settings: Any = None
 
 

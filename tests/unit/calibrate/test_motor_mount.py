@@ -30,11 +30,12 @@ def errors(found, true, axis):
 
 @given(angles=st.tuples(ANGLE, ANGLE, ANGLE), shift=st.tuples(SHIFT, SHIFT, SHIFT))
 @settings(max_examples=4, deadline=None)
-def test_without_noise_angles_are_recovered_to_a_microradian(room, angles, shift):
+def test_without_noise_angles_are_recovered_to_microradians(room, angles, shift):
     true = room.perturbed(angles, shift)
     seen = room.revolution(true)
     found = calibrate_motor(seen, room.axis, room.nominal, sigma=0.002)
-    assert np.abs(errors(found, true, room.axis)[:2]).max() < 1e-6
+    # The iterations end with a step of a twentieth of a standard deviation, here of 30 µrad.
+    assert np.abs(errors(found, true, room.axis)[:2]).max() < 5e-6
     assert np.abs(errors(found, true, room.axis)[2:]).max() < 1e-5
 
 

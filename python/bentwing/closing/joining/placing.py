@@ -166,13 +166,18 @@ def _tied(groups: list[list[Part]], ties: Sequence[tuple[Part, Part]]) -> list[l
 
 
 class _Graph:
-    """Nodes of the parts: their places, or the middle of a part without any."""
+    """Nodes of the parts: their places, or the middle of a part without any.
+
+    Places of a very short part may have the same middle, and share a node.
+    """
 
     def __init__(
         self, trajectories: dict[Part, Trajectory], places: dict[Part, list[Place]]
     ) -> None:
-        self._trajectories, self._places = trajectories, places
-        self.times = {part: _node_times(t, places[part]) for part, t in trajectories.items()}
+        self._trajectories = trajectories
+        self.times = {
+            part: np.unique(_middles(t, places[part])) for part, t in trajectories.items()
+        }
         self.nodes: Nodes = {}
         self._poses: list[NDArray[np.float64]] = []
         for part, trajectory in trajectories.items():
@@ -250,11 +255,12 @@ class _Graph:
         return pairs
 
     def _node_of(self, part: Part, place: Place) -> int:
-        number = next(k for k, p in enumerate(self._places[part]) if p is place)
-        return self.nodes[part, number]
+        middle = _middles(self._trajectories[part], [place])[0]
+        return self.nodes[part, int(np.searchsorted(self.times[part], middle))]
 
 
-def _node_times(trajectory: Trajectory, places: Sequence[Place]) -> NDArray[np.float64]:
+def _middles(trajectory: Trajectory, places: Sequence[Place]) -> NDArray[np.float64]:
+    """Return the times (K,) of the middles of places, within the trajectory; without any its own."""
     first, last = trajectory.times[0], trajectory.times[-1]
     if not places:
         return np.array([0.5 * (first + last)])

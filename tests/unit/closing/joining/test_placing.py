@@ -33,6 +33,15 @@ def test_a_single_match_is_enough(corridor):
     assert off(corridor, group) < 1e-3
 
 
+def test_places_of_a_part_too_short_for_them_share_a_node(corridor):
+    # As after a break: a few poses, and places whose middles all lie beyond them.
+    second = corridor.parts[1]
+    short = {**corridor.trajectories, second: corridor.trajectories[second][:4]}
+    groups, matches = place_groups(short, corridor.places, [corridor.match(k, k) for k in range(3)])
+    assert [len(t) for group in groups for t in group.trajectories.values()] == [1200, 4]
+    assert len(matches) == 3
+
+
 def test_runs_without_a_match_stay_apart(corridor):
     groups, _ = placed(corridor, [corridor.match(0, 0).rejected("for the test")])
     assert [list(g.trajectories) for g in groups] == [[p] for p in corridor.parts]

@@ -34,7 +34,7 @@ def test_without_noise_angles_are_recovered_to_microradians(room, angles, shift)
     true = room.perturbed(angles, shift)
     seen = room.revolution(true)
     found = calibrate_motor(seen, room.axis, room.nominal, sigma=0.002)
-    # The iterations end with a step of a twentieth of a standard deviation, here of 30 µrad.
+    # The standard deviations that it states are a little below one.
     assert np.abs(errors(found, true, room.axis)[:2]).max() < 5e-6
     assert np.abs(errors(found, true, room.axis)[2:]).max() < 1e-5
 

@@ -10,23 +10,21 @@ and keeps all numbers as JSON.
 from __future__ import annotations
 
 import argparse
-import json
-import sys
 import tempfile
-import time
 from importlib import metadata
 from itertools import product
 from pathlib import Path
 
-from benches import scoring as run_scoring
-from benches.cost import python
 from benches.peers import scoring, table, without_truth
 from benches.peers.engines import ENGINES
 from benches.peers.prepare import prepare
 from benches.peers.runner import Source, run, short
-
+from benches.support import tables
+from benches.support.cost import bentwing
+from benches.support.tables import keep
 from bentwing.base.errors import BentwingError
 from bentwing.base.trajectory import read_tum
+from bentwing.evaluate.simulated import Truth, mapped_points
 from bentwing.recording import Payload, Recording
 
 RESULTS = Path(__file__).parent / "results" / "peers.json"
@@ -42,12 +40,12 @@ def main() -> None:
         results = on_simulated(withtruth, options, folder) if withtruth else []
         files = [path for path in recordings if not path.is_dir()]
         results += without_truth.compare(files, options, folder) if files else []
-    keep(results, options.json)
+    keep({"versions": versions(), "results": results}, options.json)
 
 
 def parsed() -> argparse.Namespace:
     """The command line."""
-    parser = argparse.ArgumentParser(prog="python -m benches.peers", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m benches peers", description=__doc__)
     add = parser.add_argument
     add("--recordings", nargs="+", type=Path, default=[], metavar="FOLDER or FILE")
     add("--payload", type=Path, help="of recordings that are files; default: a lidar alone")
@@ -77,32 +75,31 @@ def simulated(options: argparse.Namespace, folder: Path) -> list[Path]:
         out = folder / f"{scene}, {head}, {seed}"
         choices = ["--head", head, "--seed", str(seed), "--duration", f"{options.duration:g}"]
         choices += ["--motor-rate", f"{options.motor_rate:g}"]
-        if code := python("-m", "bentwing", "simulate", scene, "-o", out, *choices).code:
-            sys.exit(f"bentwing simulate {scene} {' '.join(choices)}: exit code {code}")
+        bentwing("simulate", scene, "-o", out, *choices)
         made.append(out)
     return made
 
 
 def on_simulated(folders: list[Path], options: argparse.Namespace, scratch: Path) -> list[dict]:
     """All engines on recordings with truth."""
-    print(table.head())
+    print(tables.head(table.COLUMNS))
     results = []
     for number, recording in enumerate(folders):
         results += on_one(recording, options, scratch / f"{number}-{recording.name}")
     print(f"\n{table.NOTES}")
     if options.stamps:
-        print(table.head(table.STAMPS_COLUMNS))
+        print(tables.head(table.STAMPS_COLUMNS))
         print("\n".join(table.stamps_row(r) for r in results if r["score"] and not r["failure"]))
     return results
 
 
 def on_one(folder: Path, options: argparse.Namespace, scratch: Path) -> list[dict]:
     """Rounds of engines on one recording; a row is printed when the last round has run it."""
-    truth = scoring.Truth(folder)
+    truth = Truth(folder)
     payload, path = folder / "payload.yaml", next(folder.glob("recording*"))
     with Recording(path, Payload.load(payload)) as recording:
         source = Source(folder.name, path, payload, recording.duration)
-    feed = prepare(path, Payload.load(payload), scratch / "feed", truth.latency)
+    feed = prepare(path, Payload.load(payload), scratch / "feed", truth.calibration.latency)
     rounds: dict[str, list[dict]] = {name: [] for name in options.engines}
     for number, name in product(range(options.repeats), options.engines):
         out = scratch / f"{name}-{number}"
@@ -116,7 +113,7 @@ def on_one(folder: Path, options: argparse.Namespace, scratch: Path) -> list[dic
     return [result for name in options.engines for result in rounds[name]]
 
 
-def scored(name: str, feed, out: Path, truth: scoring.Truth) -> dict:
+def scored(name: str, feed, out: Path, truth: Truth) -> dict:
     """Numbers of merit; what goes wrong with an engine's poses is a result, too."""
     engine = ENGINES[name]
     try:
@@ -126,21 +123,12 @@ def scored(name: str, feed, out: Path, truth: scoring.Truth) -> dict:
             return scoring.score(
                 estimate,
                 truth,
-                lambda: run_scoring.mapped_points(laz, truth.origin_ns, truth.flight),
+                lambda: mapped_points(laz, truth.origin_ns, truth.flight),
             )
         estimate = scoring.peer_trajectory(out / "poses.npz", feed, engine, truth.origin_ns)
         return scoring.score(estimate, truth, lambda: scoring.peer_points(estimate, feed, truth))
     except (BentwingError, ValueError, ArithmeticError, OSError) as error:
         return {"failure": short(f"lost: {error}")}
-
-
-def keep(results: list[dict], path: Path) -> None:
-    """Append to what earlier runs have left."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    earlier = json.loads(path.read_text()) if path.exists() else []
-    when = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
-    entry = {"when": when, "versions": versions(), "results": results}
-    path.write_text(json.dumps([*earlier, entry], indent=1))
 
 
 def versions() -> dict[str, str]:

@@ -9,12 +9,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from benches.peers import evalio_types
-from benches.peers.feed import Feed, open_feed
-from benches.peers.prepare import prepare, true_latency
 from evalio.datasets import Dataset, DatasetIterator, get_data_dir
 from evalio.types import SE3, ImuMeasurement, ImuParams, LidarMeasurement, LidarParams, Trajectory
 
+from benches.peers import evalio_types
+from benches.peers.feed import Feed, open_feed
+from benches.peers.prepare import prepare
+from bentwing.evaluate.simulated import true_calibration
 from bentwing.recording import Payload
 
 if TYPE_CHECKING:
@@ -52,7 +53,9 @@ class _Folder(Dataset):
         if (folder / "head.json").exists():
             return open_feed(folder)
         payload = Payload.load(self.folder / "payload.yaml")
-        return prepare(self.folder / "recording.bag", payload, folder, true_latency(self.folder))
+        return prepare(
+            self.folder / "recording.bag", payload, folder, true_calibration(self.folder).latency
+        )
 
     def data_iter(self) -> DatasetIterator:
         """All samples."""

@@ -6,9 +6,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from benches.peers.scans import POINT
 from evalio._cpp import helpers  # the public interface has no way in for whole arrays
 from evalio.types import SE3, ImuMeasurement, ImuParams, LidarMeasurement, LidarParams, Stamp
+
+from benches.peers.scans import POINT
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

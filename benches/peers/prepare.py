@@ -7,11 +7,10 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-import yaml
+
 from benches.peers import attitude, scans
 from benches.peers.feed import Feed, Head, Imu, write_feed
 from benches.peers.samples import Samples, read
-
 from bentwing.base import geometry
 
 if TYPE_CHECKING:
@@ -55,11 +54,6 @@ def prepare(recording: Path, payload: Payload, folder: Path, latency: float = 0.
     if samples.planar:
         return _stabilized(samples, payload, folder)
     return _sweeps(samples, payload, folder)
-
-
-def true_latency(simulated: Path) -> float:
-    """Latency of a simulated recording, s."""
-    return float(yaml.safe_load((simulated / "truth_calibration.yaml").read_text())["latency"])
 
 
 def _sweeps(samples: Samples, payload: Payload, folder: Path) -> Feed:

@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from benches.cost import Finished, python
+from benches.support.cost import Finished, python
 
 if TYPE_CHECKING:
     from benches.peers.engines import Engine

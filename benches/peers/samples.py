@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -40,22 +40,14 @@ def read(path: Path, payload: Payload, latency: float) -> Samples:
         stream = list(preprocess(recording.batches(), payload, Counter()))
         start_ns, topic = recording.start_ns, recording.lidar_topic
         planar = recording.lidar_type.endswith("LaserScan")
-    lidar = _together([b for b in stream if isinstance(b, LidarBatch)], -latency)
+    lidar = LidarBatch.joined([b for b in stream if isinstance(b, LidarBatch)])
+    lidar = replace(lidar, times=lidar.times - latency)
     imu = [b for b in stream if isinstance(b, ImuBatch)]
     stamps = 1e-9 * (_header_stamps(path, topic) - start_ns) - latency
     if not imu or payload.imu is None:
         return Samples(start_ns, lidar, None, stamps, planar)
     parts = ([getattr(b, name) for b in imu] for name in ("times", "gyro", "accel"))
     return Samples(start_ns, lidar, ImuBatch(*map(np.concatenate, parts)), stamps, planar)
-
-
-def _together(batches: list[LidarBatch], later: float) -> LidarBatch:
-    def column(name: str) -> np.ndarray | None:
-        parts = [getattr(b, name) for b in batches]
-        return None if parts[0] is None else np.concatenate(parts)
-
-    names = ("intensity", "ring", "angles")
-    return LidarBatch(column("points"), column("times") + later, *map(column, names))
 
 
 def _header_stamps(path: Path, topic: str) -> np.ndarray:

@@ -3,21 +3,16 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from typing import TYPE_CHECKING
 
 import numpy as np
-import yaml
-from benches import scoring
+
 from benches.peers import attitude, scans
 from benches.peers.stamps import best_shift, on_truth, pose_stamps
-
 from bentwing.base import geometry
-from bentwing.base.trajectory import Trajectory, read_tum
-from bentwing.evaluate.map import surface_error
+from bentwing.base.trajectory import Trajectory
 from bentwing.evaluate.trajectory import absolute_error, drift
-from bentwing.recording import LidarBatch, Payload, Recording
-from bentwing.recording.preprocess import preprocess
+from bentwing.recording import Payload
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -25,6 +20,7 @@ if TYPE_CHECKING:
 
     from benches.peers.engines import Engine
     from benches.peers.feed import Feed
+    from bentwing.evaluate.simulated import Truth
 
 LEAST_COVERED = 0.5
 """Of the flight; an engine that gives fewer poses has lost its way."""
@@ -32,55 +28,6 @@ SHOWN = 1000.0
 """m; how far beyond is no information."""
 FEWEST = 10
 """Poses to say anything at all."""
-
-
-class Truth:
-    """What is known of a simulated recording.
-
-    Attributes
-    ----------
-    trajectory : times in s since `origin_ns`
-    flight : s, its begin and end
-    """
-
-    def __init__(self, simulated: Path) -> None:
-        self.folder = simulated
-        self.trajectory, self.origin_ns = read_tum(simulated / "truth_trajectory.txt")
-        self.flight = scoring.in_flight(self.trajectory)
-        calibration = yaml.safe_load((simulated / "truth_calibration.yaml").read_text())
-        self.latency = float(calibration["latency"])
-        self._scene = scoring.read_scene(simulated / "truth_scene.ply")
-        best = scoring.best_points(simulated, self.trajectory, self.origin_ns, self.flight)
-        self._best = self._scene.distance(best)[0]
-        self._returns: tuple[np.ndarray, np.ndarray] | None = None
-
-    def map_error(self, points: np.ndarray) -> tuple[float, float]:
-        """Standard deviation of points (N, 3) across the true surfaces, m, and over the best."""
-        error = surface_error(
-            self._scene.distance(np.ascontiguousarray(points))[0], best=self._best
-        )
-        return error.std, float(error.best_ratio or np.nan)
-
-    def returns(self) -> tuple[np.ndarray, np.ndarray]:
-        """The points of the best map in the IMU frame, by nominal mounts, and their times, s."""
-        if self._returns is None:
-            self._returns = self._measured()
-        return self._returns
-
-    def _measured(self) -> tuple[np.ndarray, np.ndarray]:
-        payload = Payload.load(self.folder / "payload.yaml")
-        with Recording(next(self.folder.glob("recording*")), payload) as recording:
-            late = 1e-9 * (recording.start_ns - self.origin_ns) - self.latency
-            stream = preprocess(recording.batches(), payload, Counter())
-            lidar = [b for b in stream if isinstance(b, LidarBatch)]
-        times = np.concatenate([b.times for b in lidar]) + late
-        flown = np.flatnonzero((times >= self.flight[0]) & (times <= self.flight[1]))
-        chosen = flown[:: max(1, len(flown) // scoring.MAP_SAMPLE)]
-        points = np.concatenate([b.points for b in lidar])[chosen]
-        if payload.encoder is None:
-            return scans.moved(payload.T_imu_lidar_matrix(), points), times[chosen]
-        angles = np.concatenate([b.angles for b in lidar])[chosen]
-        return scans.by_encoder(points, angles, payload.encoder), times[chosen]
 
 
 def peer_trajectory(poses: Path, feed: Feed, engine: Engine, origin_ns: int) -> Trajectory | None:
@@ -104,9 +51,19 @@ def peer_points(estimate: Trajectory, feed: Feed, truth: Truth) -> np.ndarray:
     """The measured points, placed by an engine's poses and, between them, by the gyro."""
     times = 1e-9 * (feed.imu.stamps_ns - truth.origin_ns)
     dense = attitude.densified(estimate, attitude.as_trajectory(times, feed.imu.turned))
-    points, stamps = truth.returns()
+    points, stamps = nominally(truth)
     known = dense.covers(stamps)
     return geometry.compose(*dense.interpolate(stamps[known]), points[known])
+
+
+def nominally(truth: Truth) -> tuple[np.ndarray, np.ndarray]:
+    """The points of the best map in the IMU frame by nominal mounts, and their true times, s."""
+    payload = Payload.load(truth.folder / "payload.yaml")
+    lidar = truth.returns
+    times = lidar.times - truth.calibration.latency
+    if payload.encoder is None:
+        return scans.moved(payload.T_imu_lidar_matrix(), lidar.points), times
+    return scans.by_encoder(lidar.points, lidar.angles, payload.encoder), times
 
 
 def score(estimate: Trajectory | None, truth: Truth, points: Callable[[], np.ndarray]) -> dict:
@@ -141,7 +98,8 @@ def score(estimate: Trajectory | None, truth: Truth, points: Callable[[], np.nda
         astray = flown.position.rmse
         return {**found, "failure": f"lost ({astray:.0f} m)" if astray < SHOWN else "lost"}
     T = flown.alignment
-    found["map_std"], found["map_ratio"] = truth.map_error(points() @ T.R.T + T.t)
+    surface = truth.map_error(points() @ T.R.T + T.t)
+    found["map_std"], found["map_ratio"] = surface.std, surface.best_ratio or np.nan
     return found
 
 

@@ -7,6 +7,9 @@ import statistics
 
 import numpy as np
 
+from benches.support import tables
+from benches.support.tables import given
+
 COLUMNS = (
     "recording", "engine", "ATE", "ATE in flight", "rotation", "drift over 10 m (horizontal, vertical)",
     "map, best possible = 1", "CPU per s recorded", "wall per s recorded", "peak memory", "threads",
@@ -29,16 +32,6 @@ NOTES = """\
 """
 
 
-def head(columns: tuple[str, ...] = COLUMNS) -> str:
-    """The first two lines."""
-    return f"| {' | '.join(columns)} |\n|{'---|' * len(columns)}"
-
-
-def line(cells: list[str]) -> str:
-    """One row."""
-    return f"| {' | '.join(cells)} |"
-
-
 def row(result: dict) -> str:
     """One engine on one simulated recording."""
     found, failure = result["score"], result["failure"]
@@ -52,7 +45,7 @@ def row(result: dict) -> str:
     ]
     if failure:
         errors = [failure, "-", "-", "-", "-"]
-    return line([result["recording"], result["engine"], *errors, *costs(result)])
+    return tables.line([result["recording"], result["engine"], *errors, *costs(result)])
 
 
 def costs(result: dict) -> list[str]:
@@ -76,15 +69,10 @@ def stamps_row(result: dict) -> str:
         given(found.get(n), f, u)
         for n, f, u in zip(names, (1e3, 100, 100), ("ms", "cm", "cm"), strict=True)
     ]
-    return line([result["recording"], result["engine"], *cells])
+    return tables.line([result["recording"], result["engine"], *cells])
 
 
 STAMPS_COLUMNS = ("recording", "engine", "best shift of the clock", "ATE in flight", "with it")
-
-
-def given(value: float | None, factor: float, unit: str) -> str:
-    """The value in a unit, or a dash where there is none."""
-    return "-" if value is None else f"{value * factor:.2f} {unit}".rstrip()
 
 
 def middle(results: list[dict]) -> dict:

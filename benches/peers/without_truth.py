@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING
 
 import laspy
 import numpy as np
+
 from benches.peers import attitude, table
 from benches.peers.engines import ENGINES, Engine
 from benches.peers.prepare import prepare
 from benches.peers.runner import Source, run, short
 from benches.peers.scoring import peer_trajectory
-
+from benches.support import tables
 from bentwing.base import geometry
 from bentwing.base.errors import BentwingError
 from bentwing.base.trajectory import Trajectory, read_tum
@@ -43,7 +44,7 @@ NOTES = """\
 
 def compare(files: list[Path], options: argparse.Namespace, scratch: Path) -> list[dict]:
     """All engines on each file."""
-    print(table.head(COLUMNS))
+    print(tables.head(COLUMNS))
     results = []
     for number, path in enumerate(files):
         results += _on_one(path, options, scratch / f"{number}-{path.stem}")
@@ -74,11 +75,9 @@ def _points(path: Path, payload: Payload) -> tuple[np.ndarray, np.ndarray, float
     """Evenly chosen points in the lidar frame, their stamps in ns, and the recording's length."""
     with Recording(path, payload) as recording:
         stream = preprocess(recording.batches(), payload, Counter())
-        lidar = [b for b in stream if isinstance(b, LidarBatch)]
-        points = np.concatenate([b.points for b in lidar])
-        chosen = slice(None, None, max(1, len(points) // MOST_POINTS))
-        stamps = recording.clock.to_ns(np.concatenate([b.times for b in lidar])[chosen])
-        return points[chosen], stamps, recording.duration
+        lidar = LidarBatch.joined([b for b in stream if isinstance(b, LidarBatch)])
+        some = lidar.where(slice(None, None, max(1, len(lidar.times) // MOST_POINTS)))
+        return some.points, recording.clock.to_ns(some.times), recording.duration
 
 
 def _score(
@@ -131,4 +130,4 @@ def row(result: dict) -> str:
             f"{np.degrees(found['turned']):.2f}°",
             f"{1e3 * found['thickness']:.1f} mm ({low:.1f}, {high:.1f})",
         ]
-    return table.line([result["recording"], result["engine"], *cells, *table.costs(result)])
+    return tables.line([result["recording"], result["engine"], *cells, *table.costs(result)])

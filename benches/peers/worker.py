@@ -9,9 +9,9 @@ import sys
 from pathlib import Path
 
 import numpy as np
+
 from benches.peers.engines import ENGINES
 from benches.peers.feed import open_feed
-
 from bentwing.base import geometry
 
 

@@ -6,22 +6,17 @@ from __future__ import annotations
 import functools
 import json
 import pickle
-import sys
-from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
+from bentwing.evaluate.simulated import score
 from bentwing.run.pipeline import map_recording
-
-# The same numbers as in the benches.
-sys.path.append(str(Path(__file__).resolve().parents[2] / "benches"))
 
 
 @pytest.fixture(scope="session")
 def flown(simulated, made_once):
     """Simulate, map and compare a flight: its score, the record of its run, and both folders."""
-    from scoring import score
 
     @functools.cache
     def fly(scene, duration, **options):

@@ -19,6 +19,7 @@ import numpy as np
 import pytest
 
 from bentwing.base.trajectory import read_tum
+from bentwing.evaluate.simulated import in_flight
 from bentwing.evaluate.trajectory import absolute_error
 
 RANGE_SIGMA = 0.01  # m
@@ -118,8 +119,6 @@ def test_a_minute_in_flight_with_a_multi_beam_scanner(flown, scene, head, seed):
 
 
 def test_closing_the_loops_improves_a_flight_that_comes_back(flown):
-    from scoring import in_flight
-
     # In flight: where the start was, relative to it, only the IMU says until the payload turns.
     flight = flown("cave", 40, seed=23)
     truth, origin_ns = read_tum(flight.recording / "truth_trajectory.txt")

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 import yaml
 
-from bentwing import _core, map_recording
+from bentwing import map_recording
 from bentwing.base.geodesy import LevelFrame, ProjectedSystem
-from bentwing.map.read_mesh import read_mesh
+from bentwing.evaluate.simulated import Truth
 from bentwing.simulate import Scenario, simulate
 
 pytestmark = pytest.mark.slow
@@ -37,10 +37,8 @@ def test_the_map_lies_where_the_world_is_and_nobody_is_in_it(flight):
     c, s = np.cos(where["heading"]), np.sin(where["heading"])
     frame = LevelFrame(where["longitude"], where["latitude"], where["height"])
     level = frame.from_geodetic(ProjectedSystem.of_epsg(32632).to_geodetic(las.xyz[::20]))
-    mesh = read_mesh(files.scene)
-    scene = _core.Scene(mesh.vertices, mesh.triangles)
-    world = np.ascontiguousarray(level @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]))
-    off = np.abs(scene.distance(world)[0])
+    world = level @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+    off = np.abs(Truth(files.scene.parent).distances(world))
     # the receiver is good to a centimetre
     assert np.median(off) < 0.02
     # without cleaning 1.3 % of the points are of the person; some of where it stood is never seen through

@@ -8,6 +8,7 @@ import json
 import pytest
 
 from bentwing.base.errors import EstimationError
+from bentwing.evaluate.simulated import localized_score
 from bentwing.map.read import read_points
 from bentwing.run.pipeline import map_recording
 
@@ -27,15 +28,13 @@ def localized(recording, prior, out):
 @pytest.mark.parametrize("given", ["run", pytest.param("cloud", marks=pytest.mark.slow)])
 def test_a_flight_is_found_in_the_map_of_another(flights, given, tmp_path):
     """The lidar's ranges have σ = 10 mm; the IMU's place along the spin axis is the payload's (5 mm)."""
-    from localize import errors
-
     first, second = flights
     prior = first.out if given == "run" else first.out / "map.laz"
     record = localized(second, prior, tmp_path / "out")
-    found = errors(tmp_path / "out", second, first.out, first.recording)
+    found = localized_score(tmp_path / "out", second, first.out, first.recording)
     assert found.across < 0.004
     assert found.along < 0.02
-    assert found.std < 1.3 * 0.01
+    assert found.map_std < 1.3 * 0.01
     if given == "run":
         assert record["appeared"] < 1e-3 * record["points"]
     assert {"appeared.laz", "disappeared.laz"} <= {p.name for p in (tmp_path / "out").iterdir()}

@@ -12,11 +12,13 @@ import pytest
 
 from bentwing.base.errors import InputError, UsageError
 from bentwing.base.trajectory import read_tum
+from bentwing.evaluate.simulated import merged_score
 from bentwing.evaluate.trajectory import absolute_error
 from bentwing.run.flights import map_flights
 from bentwing.run.merging import merge
 from bentwing.run.pipeline import map_recording
 from bentwing.simulate import Scenario, simulate
+from bentwing.simulate.knock import knocked
 
 SECONDS = 22.0
 STALL = (0.55 * 30.0, 0.55 * 30.0 + 6.0)  # s
@@ -61,8 +63,6 @@ def test_flights_in_one_world_are_one_map_and_the_other_is_apart(flights, merged
 
 
 def test_the_flights_agree_to_a_centimetre(flights, merged):
-    from merged_scoring import merged_score
-
     score = merged_score(flights[:2], merged.out / "map_1")
     assert score.after < 0.01
     assert score.joint < 0.008
@@ -158,8 +158,6 @@ def test_a_recording_that_is_gone_or_another_is_named(merged, tmp_path, change, 
 @pytest.fixture(scope="module")
 def stalled(made_once):
     """A flight whose head stalls, and whose IMU is knocked while it stands."""
-    from knock import knocked
-
     from bentwing.cli.main import run_command
 
     scenario = Scenario(scene="office", duration=30.0, seed=32, events=("spin-stall",), stall=6.0)

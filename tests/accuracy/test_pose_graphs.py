@@ -2,16 +2,17 @@
 """The public pose graphs: costs as GTSAM reaches them, and false links that change nothing.
 
 GTSAM 4.3 has the costs below with Levenberg–Marquardt, from the file's poses or its chordal start,
-whichever ends lower (`benches/pose_graphs.py` prints both); on the last graph its best is 3.76e6.
+whichever ends lower (`python -m benches pose_graphs` prints both); on the last graph its best is 3.76e6.
 """
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from false_links import noisy_sphere_positions, position_error, with_false_links
 
 from bentwing.closing.pose_graph import SolveSettings, read_g2o, solve_pose_graph
+from bentwing.evaluate.alignment import position_error
+from bentwing.simulate.pose_graphs import noisy_sphere_positions, with_false_links
 
 COSTS = {
     "smallGrid3D": 517.92534,

@@ -3,8 +3,11 @@
 
 from __future__ import annotations
 
+import ast
 import re
 from pathlib import Path
+
+import pytest
 
 ROOT = Path(__file__).parents[2]
 SPDX = "SPDX-License-Identifier: MIT OR Apache-2.0"
@@ -55,3 +58,24 @@ def test_every_source_file_starts_with_its_licence() -> None:
         if SPDX not in path.read_text(encoding="utf-8").partition("\n")[0]
     ]
     assert not without, f"the first line must hold '{SPDX}': {without}"
+
+
+def imported(path: Path) -> set[str]:
+    """First parts of the names that a file imports, wherever in it."""
+    found: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name.partition(".")[0] for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            found.add(node.module.partition(".")[0])
+    return found
+
+
+@pytest.mark.parametrize(("folder", "others"), [("tests", {"benches"}), ("benches", {"support"})])
+def test_tests_and_benches_do_not_import_each_other(folder, others) -> None:
+    across = {
+        str(path.relative_to(ROOT)): sorted(imported(path) & others)
+        for path in sources(folder)
+        if path.suffix == ".py" and imported(path) & others
+    }
+    assert not across, "what both need belongs to bentwing.evaluate"

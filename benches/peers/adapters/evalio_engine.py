@@ -5,13 +5,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from benches.peers import evalio_types
 from evalio import pipelines
+
+from benches.peers import evalio_types
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     import numpy as np
+
     from benches.peers.engines import Engine
     from benches.peers.feed import Feed
 

@@ -10,9 +10,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from benches.peers.tables import stamps_of, xyz_of
 from genz_icp.config import GenZConfig
 from genz_icp.genz_icp import GenZICP
+
+from benches.peers.columns import stamps_of, xyz_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -6,9 +6,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from benches.peers.tables import stamps_of, xyz_of
 from rko_lio.config import LIOConfig
 from rko_lio.lio import LIO
+
+from benches.peers.columns import stamps_of, xyz_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import small_gicp
-from benches.peers.attitude import as_trajectory
-from benches.peers.scans import moved
-from benches.peers.tables import stamps_of, xyz_of
 
+from benches.peers.attitude import as_trajectory
+from benches.peers.columns import stamps_of, xyz_of
+from benches.peers.scans import moved
 from bentwing.base import geometry
 
 if TYPE_CHECKING:

@@ -20,7 +20,7 @@ use layout::Layout;
 use sparse::Pattern;
 
 /// Up to this number of unknowns the dense factorization of a window is at least about as fast, for
-/// nearly all of its blocks are there (measured with `benches/kernels.py solve/window`).
+/// nearly all of its blocks are there (measured with `python -m benches kernels solve/window`).
 const DENSE_LIMIT: usize = 1250;
 
 /// Why the normal equations have no solution.

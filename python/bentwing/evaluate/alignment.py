@@ -93,6 +93,13 @@ def align(
     return Alignment(R, targets.mean(axis=0) - R @ points.mean(axis=0))
 
 
+def position_error(points: NDArray[np.float64], targets: NDArray[np.float64]) -> float:
+    """Return the root mean square distance of points (N, 3) from their targets once aligned, m."""
+    alignment = align(points, targets)
+    errors = points @ alignment.R.T + alignment.t - targets
+    return float(np.sqrt((errors**2).sum(axis=1).mean()))
+
+
 def without_frame_rotation(estimate: Trajectory, truth: Trajectory) -> Trajectory:
     """Remove from an aligned estimate the constant rotation of its IMU frame.
 

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from bentwing.base.calibration import Calibration
     from bentwing.base.trajectory import Trajectory
     from bentwing.recording.batches import Batch
-
-_Scalar = TypeVar("_Scalar", bound=np.generic)
 
 # Large enough that array calls cost nothing beside their work, small enough for the cache.
 POINTS_PER_CHUNK = 100_000
@@ -81,6 +79,14 @@ def project(
             )
 
 
+def placed_points(
+    batches: Iterable[Batch], trajectory: Trajectory, calibration: Calibration
+) -> NDArray[np.float64]:
+    """Put returns where they were measured, on one thread: all points (N, 3), m, at once."""
+    chunks = [chunk.points for chunk in project(batches, trajectory, calibration, threads=1)]
+    return np.concatenate(chunks) if chunks else np.zeros((0, 3))
+
+
 def _placeable(
     batch: LidarBatch,
     trajectory: Trajectory,
@@ -123,23 +129,7 @@ def _gathered(batches: Iterable[Batch]) -> Iterator[LidarBatch]:
         waiting.append(batch)
         n_waiting += len(batch.times)
         if n_waiting >= POINTS_PER_CHUNK:
-            yield _joined(waiting)
+            yield LidarBatch.joined(waiting)
             waiting, n_waiting = [], 0
     if waiting:
-        yield _joined(waiting)
-
-
-def _joined(batches: list[LidarBatch]) -> LidarBatch:
-    return LidarBatch(
-        np.concatenate([batch.points for batch in batches]).astype(np.float64, copy=False),
-        np.concatenate([batch.times for batch in batches]),
-        _joined_field([batch.intensity for batch in batches]),
-        _joined_field([batch.ring for batch in batches]),
-        _joined_field([batch.angles for batch in batches]),
-    )
-
-
-def _joined_field(parts: list[NDArray[_Scalar] | None]) -> NDArray[_Scalar] | None:
-    """Join a field that the sensor either gives with every batch or not at all."""
-    present = [part for part in parts if part is not None]
-    return np.concatenate(present) if len(present) == len(parts) else None
+        yield LidarBatch.joined(waiting)

@@ -11,6 +11,8 @@ import numpy as np
 from bentwing.base.value import Value
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
 _Scalar = TypeVar("_Scalar", bound=np.generic)
@@ -45,6 +47,17 @@ class LidarBatch(Value):
             None if intensity is None else rows(intensity, chosen),
             None if ring is None else rows(ring, chosen),
             None if angles is None else rows(angles, chosen),
+        )
+
+    @classmethod
+    def joined(cls, batches: Sequence[LidarBatch]) -> LidarBatch:
+        """Join batches that follow each other, at least one."""
+        return cls(
+            np.concatenate([batch.points for batch in batches]).astype(np.float64, copy=False),
+            np.concatenate([batch.times for batch in batches]),
+            _joined_field([batch.intensity for batch in batches]),
+            _joined_field([batch.ring for batch in batches]),
+            _joined_field([batch.angles for batch in batches]),
         )
 
 
@@ -95,3 +108,9 @@ def numbered(keep: NDArray[np.bool_] | NDArray[np.intp] | slice) -> NDArray[np.i
 def rows(values: NDArray[_Scalar], chosen: NDArray[np.intp] | slice) -> NDArray[_Scalar]:
     """Rows of values `(N, ...)`; `take` is several times faster than an index or a mask."""
     return values[chosen] if isinstance(chosen, slice) else values.take(chosen, axis=0)
+
+
+def _joined_field(parts: list[NDArray[_Scalar] | None]) -> NDArray[_Scalar] | None:
+    """Join a field that the sensor either gives with every batch or not at all."""
+    present = [part for part in parts if part is not None]
+    return np.concatenate(present) if len(present) == len(parts) else None

@@ -17,8 +17,10 @@ from bentwing.base import geometry
 from bentwing.base.errors import InputError
 from bentwing.base.trajectory import Trajectory
 from bentwing.evaluate.alignment import align, associate
+from bentwing.evaluate.simulated import true_calibration
 from bentwing.evaluate.trajectory import absolute_error
-from bentwing.reproduce.trials import attempt, motor_stopped, points_of, true_calibration
+from bentwing.map.project import placed_points
+from bentwing.reproduce.trials import attempt, motor_stopped
 from bentwing.simulate.scenario import Scenario
 from bentwing.simulate.simulation import simulate
 
@@ -215,9 +217,9 @@ def fly(
         tried = attempt(folder, trial, 1, advance)
         if truth is None:
             truth, true = tried.truth, true_calibration(folder)
-            true_points = points_of(tried.lidar, truth, true).astype(np.float32)
+            true_points = placed_points(tried.lidar, truth, true).astype(np.float32)
             stopped = motor_stopped(tried.lidar)
-            unturned = points_of(stopped, truth, true).astype(np.float32)
+            unturned = placed_points(stopped, truth, true).astype(np.float32)
         results[trial.name] = _result(tried)
     files.recording.unlink()
     if truth is None:
@@ -268,7 +270,7 @@ def _result(tried: Attempt) -> Result:
             aligned = as_a_whole(trajectory, tried.truth)
             from_start = with_first_pose(trajectory, tried.truth)
             times, distances = error.times, error.distances
-            found = points_of(tried.lidar, aligned, tried.estimate.calibration)
+            found = placed_points(tried.lidar, aligned, tried.estimate.calibration)
             points = found.astype(np.float32)
     return Result(
         trajectory, aligned,

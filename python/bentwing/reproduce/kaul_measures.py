@@ -14,6 +14,7 @@ from bentwing.evaluate.against_track import compare_with_track
 from bentwing.evaluate.clouds import Cloud
 from bentwing.evaluate.drift_boxes import DriftBoxes, drift_boxes
 from bentwing.evaluate.evaluation import DriftOver, Evaluation
+from bentwing.evaluate.simulated import in_flight
 from bentwing.evaluate.spacing import point_spacing
 from bentwing.evaluate.track import read_track
 from bentwing.evaluate.trajectory import absolute_error
@@ -31,8 +32,6 @@ if TYPE_CHECKING:
     from bentwing.evaluate.trajectory import AbsoluteError
     from bentwing.reproduce.figure import Assignment
     from bentwing.reproduce.kaul_flights import Flown
-
-MOVED = 0.1  # m from the first place: in flight
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,12 +112,6 @@ def measure(flown: Flown, assignment: Assignment, *, scanned: bool) -> Measured:
         speeds,
         heights,
     )
-
-
-def in_flight(truth: Trajectory) -> tuple[float, float]:
-    """From the first to the last time away from the first place, s."""
-    away = np.linalg.norm(truth.positions - truth.positions[0], axis=1) > MOVED
-    return float(truth.times[away][0]), float(truth.times[away][-1])
 
 
 def _motion(

@@ -11,6 +11,8 @@ import numpy as np
 
 from bentwing.base.trajectory import read_tum
 from bentwing.evaluate.density import wall_density
+from bentwing.evaluate.simulated import true_calibration
+from bentwing.map.project import placed_points
 from bentwing.recording import LidarBatch, Payload, Recording
 from bentwing.recording.preprocess import preprocess
 from bentwing.report.colours import HEIGHT, colour
@@ -18,7 +20,7 @@ from bentwing.report.picture import View
 from bentwing.report.svg import map_view
 from bentwing.reproduce.campaign import Job, steps
 from bentwing.reproduce.figure import Figure, TextTable
-from bentwing.reproduce.trials import Flight, points_of, true_calibration
+from bentwing.reproduce.trials import Flight
 from bentwing.simulate.scenario import Scenario
 from bentwing.simulate.scenes.walls import DISTANCE, HALF, TOP
 from bentwing.simulate.simulation import simulate
@@ -79,7 +81,7 @@ def scan_walls(
         batches = preprocess(recording.batches(), payload, Counter())
         lidar = [batch for batch in batches if isinstance(batch, LidarBatch)]
     files.recording.unlink()
-    points = points_of(lidar, truth, true_calibration(folder))
+    points = placed_points(lidar, truth, true_calibration(folder))
     upright, flat = ((-HALF, HALF), (0.0, TOP)), ((-HALF, HALF), (-HALF, HALF))
     return Covered(
         wall_density(points, 0, DISTANCE, limits=upright, cell=_CELL),

@@ -9,14 +9,10 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import yaml
 
 from bentwing import odometry
-from bentwing.base.calibration import Calibration
 from bentwing.base.errors import BentwingError
-from bentwing.base.mount import mount_from_json
-from bentwing.base.trajectory import Trajectory, read_tum
-from bentwing.map.project import project
+from bentwing.base.trajectory import read_tum
 from bentwing.recording import LidarBatch, Payload, Recording
 from bentwing.recording.preprocess import preprocess
 
@@ -27,6 +23,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bentwing.base.estimate import Estimate
+    from bentwing.base.trajectory import Trajectory
     from bentwing.odometry import Estimator, EstimatorName
 
     Array = NDArray[np.float64]
@@ -102,21 +99,6 @@ def attempt(
         shown(length - reached)
     seconds, cpu = time.perf_counter() - began, time.process_time() - cpu
     return Attempt(estimate, why, engine, truth, kept, length, seconds, cpu)
-
-
-def true_calibration(folder: Path) -> Calibration:
-    """Return the latency and the mounts as the simulated head truly has them."""
-    true = yaml.safe_load((folder / "truth_calibration.yaml").read_text(encoding="utf-8"))
-    none = np.zeros(3)
-    return Calibration(true["latency"], mount_from_json(true), none, none, none)
-
-
-def points_of(
-    lidar: Sequence[LidarBatch], trajectory: Trajectory, calibration: Calibration
-) -> Array:
-    """Put returns where they were measured: points (N, 3) m."""
-    chunks = [chunk.points for chunk in project(lidar, trajectory, calibration, threads=1)]
-    return np.concatenate(chunks) if chunks else np.zeros((0, 3))
 
 
 def motor_stopped(lidar: Sequence[LidarBatch]) -> list[LidarBatch]:

@@ -3,17 +3,11 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from bentwing.base import geometry
 from bentwing.closing.pose_graph import Links, PoseGraph
-
-# What makes links false is shared with the bench.
-sys.path.append(str(Path(__file__).resolve().parents[4] / "benches"))
 
 
 @pytest.fixture

@@ -7,10 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from false_links import position_error, with_false_links, with_known_truth
 
 from bentwing.base import geometry
 from bentwing.closing.pose_graph import SolveSettings, solve_pose_graph
+from bentwing.evaluate.alignment import position_error
+from bentwing.simulate.pose_graphs import with_false_links, with_known_truth
 
 TURN_SIGMA, SHIFT_SIGMA = 0.01, 0.05  # of the helix's links, rad and m, as their information says
 

@@ -8,6 +8,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 CORE := python/bentwing/_core.abi3.so
+OUSTER_SOURCE := python/bentwing/recording/packets/sensors.py
 CORE_SOURCES := Cargo.toml Cargo.lock pyproject.toml \
 	$(shell find crates -name '*.rs' -o -name Cargo.toml -o -name README.md)
 
@@ -35,8 +36,10 @@ $(VENV)/.created:
 	@touch $@
 
 # A changed pyproject.toml may name new tools; where it does not, this takes seconds.
-$(VENV)/.tools: $(VENV)/.created pyproject.toml
+$(VENV)/.tools: $(VENV)/.created pyproject.toml $(OUSTER_SOURCE)
 	$(PIP) install --quiet --group dev
+	@# It pins an older rosbags; to decode packets it needs none of its dependencies.
+	$(PIP) install --quiet --no-deps ouster-sdk==$(shell sed -n 's/^OUSTER_VERSION = "\(.*\)".*/\1/p' $(OUSTER_SOURCE))
 	@touch $@
 
 $(VENV)/.docs-tools: $(VENV)/.created pyproject.toml
@@ -52,8 +55,12 @@ setup: $(VENV)/.tools ## make .venv and install the developer's tools
 
 .PHONY: browser
 browser: ## a Chromium for the tests that open the report, where Debian's packages can be installed
-	@command -v chromium >/dev/null || (apt-get update -qq && apt-get install -y -qq --no-install-recommends chromium) || \
-		echo "no Chromium: the tests that open the report are skipped"
+	@command -v chromium >/dev/null || command -v google-chrome >/dev/null || (apt-get update -qq && apt-get install -y -qq --no-install-recommends chromium) || \
+		echo "no Chromium: the tests that open the report are skipped, which fails in the continuous integration"
+
+.PHONY: extras
+extras: setup ## packages of a gigabyte that single slow tests compare with
+	$(PIP) install --quiet --group weekly
 
 .PHONY: build
 build: setup ## compile the core (release) and install the package in place

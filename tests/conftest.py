@@ -24,6 +24,8 @@ from bentwing.simulate import Scenario, simulate
 hypothesis.settings.register_profile("bentwing", deadline=None)
 hypothesis.settings.load_profile("bentwing")
 
+pytest_plugins = ["support.skips"]
+
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 
 LIVOX_POINT = (

@@ -110,20 +110,32 @@ def call(calls):
     return with_
 
 
+def content(result):
+    """The arrays and numbers by which two results of one call are told apart."""
+    if isinstance(result, np.ndarray):
+        return [result]
+    if isinstance(result, tuple):
+        return [array for part in result for array in content(part)]
+    if isinstance(result, _core.Scene):
+        return content(result.distance(xyz(3)))
+    if isinstance(result, _core.Samples):
+        return [result.positions, result.quats_xyzw]
+    if isinstance(result, _core.Surfels):
+        return [result.stamps, result.means, result.normals]
+    if isinstance(result, _core.Registration):
+        return [*content(result.samples), result.covariance]
+    return [np.array(len(result))]
+
+
 def array_of(argument):
     return valid()[argument.call][argument.name]
 
 
-@pytest.mark.parametrize("name", list(valid()))
-def test_valid_arrays_are_accepted(calls, name):
-    calls[name](**valid()[name])
-
-
 @pytest.mark.parametrize("argument", ARGUMENTS, ids=str)
-def test_read_only_arrays_are_accepted(call, argument):
-    array = array_of(argument)
+def test_read_only_arrays_give_the_same_result(call, argument):
+    array, expected = array_of(argument), content(call(argument, array_of(argument)))
     array.flags.writeable = False
-    call(argument, array)
+    assert all(map(np.array_equal, content(call(argument, array)), expected))
 
 
 @pytest.mark.parametrize("argument", ARGUMENTS, ids=str)
@@ -202,8 +214,8 @@ def test_decreasing_times_are_refused_with_the_element(call, argument):
 
 
 @pytest.mark.parametrize("argument", [a for a in ARGUMENTS if a.time], ids=str)
-def test_equal_times_are_accepted(call, argument):
-    call(argument, np.full(N, 0.02))
+def test_equal_times_give_finite_results(call, argument):
+    assert all(np.isfinite(array).all() for array in content(call(argument, np.full(N, 0.02))))
 
 
 @pytest.mark.parametrize(
@@ -217,15 +229,9 @@ def test_another_number_of_rows_than_the_others_is_refused(call, argument):
 
 
 @pytest.mark.parametrize("name", ["cast", "distance", "imu", "place", "extract_surfels"])
-def test_empty_arrays_are_accepted(calls, name):
-    calls[name](**{key: array[:0] for key, array in valid()[name].items()})
-
-
-def test_empty_arrays_give_empty_results(room, samples, states, extract):
-    nothing = np.empty((0, 3))
-    assert samples.place(nothing, np.empty(0), None, states()).shape == (0, 3)
-    assert len(extract(points=nothing, stamps=np.empty(0))) == 0
-    assert room.cast(nothing, nothing, 1.0)[0].shape == (0,)
+def test_empty_arrays_give_empty_results(calls, name):
+    result = calls[name](**{key: array[:0] for key, array in valid()[name].items()})
+    assert not any(array.size and array.any() for array in content(result))
 
 
 @pytest.mark.parametrize("n", [0, 1])

@@ -105,7 +105,9 @@ def test_flipped_and_cut_messages_give_clean_data_or_are_counted(ros, data):
                 hurt[bit // 8] ^= 1 << bit % 8
             cut = data.draw(st.integers(0, len(raw)) | st.just(len(raw)))
             for message in (bytes(hurt), bytes(hurt[:cut])):
+                before = stream.counts.total()
                 assert_clean(stream.decode([(NOW_NS, message)]))
+                assert stream.counts.total() > before
             assert_clean(stream.finish())
 
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import struct
+from collections import Counter
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from bentwing.recording import LidarBatch, Recording
 
 pytest.importorskip("velodyne_decoder", reason='needs pip install "bentwing[packets]"')
 
+SENSOR = "0.0.0.0:2368"
 HEAD = struct.pack("<IHHiIII", 0xA1B2C3D4, 2, 4, 0, 0, 65535, 1)
 models = st.sampled_from([0x21, 0x22, 0x24, 0x28, 0xA1])
 shared_tmp_path = settings(
@@ -37,19 +39,22 @@ def capture(path, payloads):
 
 
 def read(path):
+    """Batches and counts of a capture, or the sentence of its error."""
     try:
         with Recording(path) as recording:
-            return list(recording.batches())
-    except InputError:
-        return []
+            return list(recording.batches()), recording.counts, ""
+    except InputError as error:
+        return [], Counter(), str(error)
 
 
 @given(content=st.binary(max_size=400), has_head=st.booleans())
 @settings(shared_tmp_path, max_examples=200)
-def test_any_bytes_are_a_capture_or_an_error(tmp_path, content, has_head):
+def test_any_bytes_give_no_point_or_an_error_that_names_the_file(tmp_path, content, has_head):
     path = tmp_path / "a.pcap"
     path.write_bytes(HEAD + content if has_head else content)
-    read(path)
+    batches, _, error = read(path)
+    assert batches == []
+    assert path.name in error
 
 
 @given(
@@ -66,7 +71,9 @@ def test_packets_of_any_content_give_finite_points_in_order(tmp_path, seed, mode
         blocks = np.frombuffer(noise.bytes(1200), np.uint8).copy()
         blocks[:2] = 0xFF, 0xEE
         payloads.append(blocks.tobytes() + struct.pack("<IBB", stamp, returns, model))
-    batches = read(capture(tmp_path / "a.pcap", payloads))
+    batches, counts, error = read(capture(tmp_path / "a.pcap", payloads))
+    assert batches or SENSOR in error
+    assert sum(len(b.times) for b in batches) <= counts["lidar.returns"] - counts["lidar.zero"]
     for batch in batches:
         assert isinstance(batch, LidarBatch)
         assert np.isfinite(batch.points).all()

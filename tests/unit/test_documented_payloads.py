@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-payload = pytest.importorskip("bentwing.recording.payload", reason="no payload reader yet")
+from bentwing.recording import Payload
 
 ROOT = Path(__file__).parents[2]
 FENCE = re.compile(r"^```yaml\n(.*?)^```", re.MULTILINE | re.DOTALL)
@@ -23,4 +23,4 @@ EXAMPLES = [
 def test_a_documented_payload_is_accepted(example: str, tmp_path: Path) -> None:
     path = tmp_path / "payload.yaml"
     path.write_text(example, encoding="utf-8")
-    assert payload.Payload.load(path).places_lidar_on_imu
+    assert Payload.load(path).places_lidar_on_imu

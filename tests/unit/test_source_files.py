@@ -79,3 +79,29 @@ def test_tests_and_benches_do_not_import_each_other(folder, others) -> None:
         if path.suffix == ".py" and imported(path) & others
     }
     assert not across, "what both need belongs to bentwing.evaluate"
+
+
+def checks(function: ast.FunctionDef, others: dict[str, ast.FunctionDef]) -> bool:
+    """Whether a function, or one of its file that it calls, can fail a test."""
+    others = {name: other for name, other in others.items() if other is not function}
+    for node in ast.walk(function):
+        if isinstance(node, ast.Assert):
+            return True
+        if isinstance(node, ast.Call):
+            name = ast.unparse(node.func).rpartition(".")[2]
+            if name in {"raises", "warns", "fail"} or name.startswith("assert_"):
+                return True
+            if name in others and checks(others[name], others):
+                return True
+    return False
+
+
+def test_every_test_checks_something() -> None:
+    idle = []
+    for path in sources("tests", "benches"):
+        if path.name.startswith("test_"):
+            tree = ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+            functions = {node.name: node for node in tree if isinstance(node, ast.FunctionDef)}
+            tests = [f for name, f in functions.items() if name.startswith("test_")]
+            idle += [f"{path.name}: {f.name}" for f in tests if not checks(f, functions)]
+    assert not idle

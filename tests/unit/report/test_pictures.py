@@ -4,6 +4,7 @@ import zlib
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from bentwing.base.errors import UsageError
 from bentwing.report.geotiff import write_geotiff
@@ -79,10 +80,9 @@ def test_a_geotiff_holds_the_picture_and_its_place(tmp_path):
 
 
 def test_a_geotiff_is_read_by_another_library(tmp_path):
-    pillow = pytest.importorskip("PIL.Image", reason="Pillow is not installed")
     shown = view()
     write_geotiff(tmp_path / "top.tif", shown, 32633)
-    with pillow.open(tmp_path / "top.tif") as image:
+    with Image.open(tmp_path / "top.tif") as image:
         assert np.array_equal(np.asarray(image), shown.image)
         assert image.tag_v2[34735][-1] == 32633
 

@@ -144,9 +144,9 @@ def test_a_motor_mount_is_shown_with_its_three_parts():
         assert text in html, text
 
 
-def test_no_drawing_library_is_loaded(tmp_path, monkeypatch):
+def test_the_page_is_the_same_without_a_drawing_library(tmp_path, whole_page, monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
-    written(tmp_path)
+    assert written(tmp_path)[1].counts == whole_page[1].counts
 
 
 @pytest.mark.parametrize(
@@ -180,7 +180,11 @@ def test_very_few_points_and_poses_are_drawn(tmp_path, n):
     few = Trajectory(
         trajectory().times[:n], trajectory().positions[:n], trajectory().quats_xyzw[:n]
     )
-    written(tmp_path, trajectory=few, map_sample=(sample()[0][:n], np.zeros(n)))
+    text, page = written(tmp_path, trajectory=few, map_sample=(sample()[0][:n], np.zeros(n)))
+    assert "<h2>Map" in text
+    assert page.counts["figure"] > 10
+    assert page.counts["image"] == 5
+    assert "nan" not in text.lower()
 
 
 def test_names_from_outside_cannot_become_markup(tmp_path):

@@ -9,18 +9,21 @@ from __future__ import annotations
 import argparse
 import tempfile
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from benches.support import tables
 from benches.support.axis import about_axis
 from bentwing.base import geometry
-from bentwing.base.mount import Pose
 from bentwing.calibrate import calibrate
 from bentwing.evaluate.nees import nees_bounds
 from bentwing.evaluate.simulated import true_calibration
 from bentwing.recording import Payload
 from bentwing.simulate import Scenario, simulate
+
+if TYPE_CHECKING:
+    from bentwing.base.mount import Pose
 
 REST, RAMP = 2.0, 0.35  # s until the motor is up to its rate, and beyond the revolution
 COLUMNS = (

@@ -33,7 +33,7 @@ from scipy.spatial import cKDTree
 from benches.support import tables
 from benches.support.place_clouds import FLIGHTS, kept_run
 from benches.support.place_peer import Peer
-from bentwing.base import geometry
+from bentwing.base.mount import Pose
 from bentwing.base.transform import apply, inverse
 from bentwing.closing.joining.matches import Match, Part, find_matches
 from bentwing.closing.joining.placing import place_groups
@@ -223,14 +223,9 @@ def placed(moved_a: Trajectory, a: Flown, moved_b: Trajectory, b: Flown, m: Matc
 
 
 def moved_by(after: Trajectory, before: Trajectory, at: float) -> np.ndarray:
-    T_after, T_before = (t.interpolate(np.array([at])) for t in (after, before))
-    return matrix(*T_after) @ inverse(matrix(*T_before))
-
-
-def matrix(positions, quats) -> np.ndarray:
-    T = np.eye(4)
-    T[:3, :3], T[:3, 3] = geometry.to_matrices(quats[0]), positions[0]
-    return T
+    poses = (t.interpolate(np.array([at])) for t in (after, before))
+    T_after, T_before = (Pose(p[0], q[0]).matrix for p, q in poses)
+    return T_after @ inverse(T_before)
 
 
 def report(name: str, outcome: Outcome) -> None:

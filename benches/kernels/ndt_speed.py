@@ -19,6 +19,7 @@ import numpy as np
 from benches.support import tables
 from bentwing import _core
 from bentwing.base import geometry
+from bentwing.base.mount import Pose
 from bentwing.base.trajectory import read_tum
 from bentwing.evaluate.simulated import true_calibration
 from bentwing.odometry.buffer import BatchBuffer
@@ -59,13 +60,6 @@ def scans(folder: Path, seconds: float) -> list[tuple[np.ndarray, np.ndarray, np
     return found
 
 
-def matrix(p: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """The pose (4, 4)."""
-    T = np.eye(4)
-    T[:3, :3], T[:3, 3] = geometry.to_matrices(q), p
-    return T
-
-
 def main() -> None:
     """Print medians per scan, and errors."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -91,7 +85,9 @@ def main() -> None:
     theirs = small_gicp.GaussianVoxelMap(options.voxel)
     for points, p, q in found[:n_mapped]:
         ours.insert(points, (p.tolist(), q.tolist()), lidar=p.tolist(), threads=1)
-        theirs.insert(small_gicp.preprocess_points(points, SPACING, NEIGHBOURS, 1)[0], matrix(p, q))
+        theirs.insert(
+            small_gicp.preprocess_points(points, SPACING, NEIGHBOURS, 1)[0], Pose(p, q).matrix
+        )
     rng = np.random.default_rng(options.seed)
     rows: dict[str, list[tuple[float, float, float, float]]] = {"ndt": [], "small_gicp VGICP": []}
     for points, p, q in found[n_mapped:]:
@@ -111,7 +107,9 @@ def main() -> None:
         began = time.process_time()
         cloud, _ = small_gicp.preprocess_points(points, SPACING, NEIGHBOURS, 1)
         thinned = time.process_time()
-        T = small_gicp.align(theirs, cloud, matrix(start_p, start_q), num_threads=1).T_target_source
+        T = small_gicp.align(
+            theirs, cloud, Pose(start_p, start_q).matrix, num_threads=1
+        ).T_target_source
         done = time.process_time()
         turned = geometry.from_matrices(T[:3, :3])
         rows["small_gicp VGICP"].append(

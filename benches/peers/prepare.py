@@ -12,6 +12,7 @@ from benches.peers import attitude, scans
 from benches.peers.feed import Feed, Head, Imu, write_feed
 from benches.peers.samples import Samples, read
 from bentwing.base import geometry
+from bentwing.base.transform import apply
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -110,7 +111,7 @@ def _stabilized(samples: Samples, payload: Payload, folder: Path) -> Feed:
     turning = attitude.as_trajectory(times, attitude.integrated(times, gyro, bias))
     lidar = samples.lidar.where(turning.covers(samples.lidar.times))
     _, turns = turning.interpolate(lidar.times)
-    points = geometry.rotate(turns, scans.moved(payload.T_imu_lidar_matrix(), lidar.points))
+    points = geometry.rotate(turns, apply(payload.T_imu_lidar_matrix(), lidar.points))
     samples = replace(samples, lidar=replace(lidar, points=points))
     rows = scans.cut(lidar.times, scans.half_turns(times, gyro - bias), scans.LONGEST)
     return _loose("stabilized", samples, payload, rows, folder)

@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from bentwing.base import geometry
+from bentwing.base.transform import apply
 
 JOINED = 0.5
 """s; sweeps of a motor-turned lidar in one scan. Single ones see too little for a scan matcher."""
@@ -55,14 +56,9 @@ def half_turns(times: np.ndarray, rates: np.ndarray) -> np.ndarray:
 
 def by_encoder(points: np.ndarray, angles: np.ndarray, encoder) -> np.ndarray:
     """Points (N, 3) of the lidar in the IMU frame, by the motor's angles (N,) and nominal mounts."""
-    in_motor = moved(encoder.T_motor_lidar.pose.matrix, points)
+    in_motor = apply(encoder.T_motor_lidar.pose.matrix, points)
     turns = geometry.exp((angles + encoder.zero)[:, None] * np.array(encoder.axis))
-    return moved(encoder.T_imu_motor.pose.matrix, geometry.rotate(turns, in_motor))
-
-
-def moved(T: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Points (N, 3) in the frame that the matrix (4, 4) leads to."""
-    return points @ T[:3, :3].T + T[:3, 3]
+    return apply(encoder.T_imu_motor.pose.matrix, geometry.rotate(turns, in_motor))
 
 
 def packed(

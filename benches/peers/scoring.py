@@ -11,6 +11,7 @@ from benches.peers import attitude, scans
 from benches.peers.stamps import best_shift, on_truth, pose_stamps
 from bentwing.base import geometry
 from bentwing.base.trajectory import Trajectory
+from bentwing.base.transform import apply
 from bentwing.evaluate.trajectory import absolute_error, drift
 from bentwing.recording import Payload
 
@@ -62,7 +63,7 @@ def nominally(truth: Truth) -> tuple[np.ndarray, np.ndarray]:
     lidar = truth.returns
     times = lidar.times - truth.calibration.latency
     if payload.encoder is None:
-        return scans.moved(payload.T_imu_lidar_matrix(), lidar.points), times
+        return apply(payload.T_imu_lidar_matrix(), lidar.points), times
     return scans.by_encoder(lidar.points, lidar.angles, payload.encoder), times
 
 

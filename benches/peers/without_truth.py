@@ -18,6 +18,7 @@ from benches.support import tables
 from bentwing.base import geometry
 from bentwing.base.errors import BentwingError
 from bentwing.base.trajectory import Trajectory, read_tum
+from bentwing.base.transform import apply
 from bentwing.evaluate.map import wall_thickness
 from bentwing.recording import LidarBatch, Payload, Recording
 from bentwing.recording.preprocess import preprocess
@@ -114,8 +115,7 @@ def _placed(estimate: Trajectory, feed: Feed, points: np.ndarray, times: np.ndar
         stamps = 1e-9 * (feed.imu.stamps_ns - feed.head.starts_ns[0])
         estimate = attitude.densified(estimate, attitude.as_trajectory(stamps, feed.imu.turned))
     known = estimate.covers(times)
-    T = np.array(feed.head.T_body_lidar)
-    in_body = points[known] @ T[:3, :3].T + T[:3, 3]
+    in_body = apply(np.array(feed.head.T_body_lidar), points[known])
     return geometry.compose(*estimate.interpolate(times[known]), in_body)
 
 

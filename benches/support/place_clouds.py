@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bentwing.base.trajectory import Trajectory
+from bentwing.base.transform import upright
 from bentwing.simulate.ranging import nodes_around
 from bentwing.simulate.scenario import Scenario
 from bentwing.simulate.simulation import prepare
@@ -68,7 +69,8 @@ def simulated_run(scenario: Scenario) -> SimulatedRun:
     poses = np.arange(setup.first, setup.last + POSE_STEP, POSE_STEP)
     lidar = rig.lidar(poses)
     rng = np.random.default_rng([scenario.seed, scenario.flight_seed or 0, 17])
-    T_world_map = _frame(rng, lidar.p[0])
+    yaw = rng.uniform(-np.pi, np.pi)
+    T_world_map = upright(yaw, lidar.p[0] + rng.uniform(-20.0, 20.0, 3))
     walk = np.cumsum(rng.normal(0.0, DRIFT * np.sqrt(POSE_STEP), lidar.p.shape), axis=0)
     all_times = np.concatenate(times)
     drift = np.column_stack([np.interp(all_times, poses, walk[:, i]) for i in range(3)])
@@ -77,14 +79,6 @@ def simulated_run(scenario: Scenario) -> SimulatedRun:
     identity = np.tile([0.0, 0.0, 0.0, 1.0], (len(poses), 1))
     track = Trajectory(poses, (lidar.p + walk - t) @ R, identity)
     return SimulatedRun(placed, all_times, track, T_world_map)
-
-
-def _frame(rng: np.random.Generator, position: np.ndarray) -> np.ndarray:
-    yaw = rng.uniform(-np.pi, np.pi)
-    T = np.eye(4)
-    T[:2, :2] = [[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]]
-    T[:3, 3] = position + rng.uniform(-20.0, 20.0, 3)
-    return T
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,8 +14,8 @@ import small_gicp
 
 from benches.peers.attitude import as_trajectory
 from benches.peers.columns import stamps_of, xyz_of
-from benches.peers.scans import moved
 from bentwing.base import geometry
+from bentwing.base.transform import apply
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -69,7 +69,7 @@ def run(feed: Feed, engine: Engine) -> Iterator[tuple[int, np.ndarray]]:
     odometry = Odometry(float(engine.settings["voxel_size"]))
     mount, turns = np.array(head.T_body_lidar), _turns(feed)
     for start, end, scan in zip(head.starts_ns, head.ends_ns, feed.scans(), strict=True):
-        points = moved(mount, xyz_of(scan))
+        points = apply(mount, xyz_of(scan))
         before_end = 1e-9 * (end - stamps_of(scan, start))
         yield start, odometry.register(points, before_end, turns, 1e-9 * (end - head.starts_ns[0]))
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bentwing.base import geometry
+from bentwing.base.calibration import Calibration
 from bentwing.base.mount import FixedMount
 from bentwing.base.run_record import read_record
 from bentwing.base.trajectory import read_tum
@@ -19,8 +20,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from numpy.typing import NDArray
-
-    from bentwing.base.calibration import Calibration
 
     Array = NDArray[np.float64]
 
@@ -75,7 +74,7 @@ def score(simulated: Path, run: Path) -> Score:
     R, t = flown.alignment.R, flown.alignment.t
     points = mapped_points(run / "map.laz", truth.origin_ns, truth.flight)
     surface = truth.map_error(points @ R.T + t)
-    found = read_record(run)["calibration"]
+    found = Calibration.from_json(read_record(run)["calibration"])
     errors = _calibration_errors(found, truth.calibration)
     return Score(
         ate=whole.position.rmse,
@@ -94,26 +93,25 @@ def score(simulated: Path, run: Path) -> Score:
         gyro_bias=float(np.linalg.norm(errors["gyro_bias"])),
         accel_bias=float(np.linalg.norm(errors["accel_bias"])),
         normalized={
-            name: np.divide(error, found["std"][name]).tolist()
+            name: np.divide(error, found.std[name]).tolist()
             for name, error in errors.items()
-            if name in found["std"]
+            if name in found.std
         },
     )
 
 
-def _calibration_errors(found: dict[str, Any], true: Calibration) -> dict[str, Array]:
-    """Found minus true, by the names and in the units of the standard deviations in run.json."""
+def _calibration_errors(found: Calibration, true: Calibration) -> dict[str, Array]:
+    """Found minus true, by the names and in the units of the standard deviations."""
     errors = {
-        "latency": np.array([found["latency"] - true.latency]),
-        "gyro_bias": np.subtract(found["gyro_bias"], true.gyro_bias),
-        "accel_bias": np.subtract(found["accel_bias"], true.accel_bias),
+        "latency": np.array([found.latency - true.latency]),
+        "gyro_bias": found.gyro_bias - true.gyro_bias,
+        "accel_bias": found.accel_bias - true.accel_bias,
     }
-    if isinstance(true.mount, FixedMount):
-        mount, pose = found["mount"]["T_imu_lidar"], true.mount.T_imu_lidar
-        back = geometry.inverse(pose.quaternion)
-        turn = geometry.multiply(np.array(mount["quaternion"]), back)
+    if isinstance(found.mount, FixedMount) and isinstance(true.mount, FixedMount):
+        pose, truly = found.mount.T_imu_lidar, true.mount.T_imu_lidar
+        turn = geometry.multiply(pose.quaternion, geometry.inverse(truly.quaternion))
         errors["extrinsic_rotation"] = geometry.log(turn)
-        errors["extrinsic_translation"] = np.subtract(mount["translation"], pose.translation)
+        errors["extrinsic_translation"] = pose.translation - truly.translation
     return errors
 
 

@@ -109,8 +109,9 @@ check: check-rust check-python ## formatting, lints, types, stubs, documentation
 .PHONY: check-rust
 check-rust: setup ## rustfmt, clippy and rustdoc; warnings are errors
 	cargo fmt --all --check
-	cargo clippy --workspace --all-targets -- -D warnings
-	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps
+	@# With the profile of the build, which shares its macros and build scripts.
+	cargo clippy --release --workspace --all-targets -- -D warnings
+	RUSTDOCFLAGS="-D warnings" cargo doc --release --workspace --no-deps
 
 .PHONY: check-python
 check-python: $(CORE) $(if $(wildcard python/bentwing/_core.pyi),stubs) ## ruff, mypy, stubs

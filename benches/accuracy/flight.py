@@ -65,7 +65,7 @@ def push_table(options: argparse.Namespace) -> None:
     for place in get_args(PlaceName):
         for pilot in get_args(PilotName):
             share = 0.8 if pilot == "push" else 0.2
-            n = round(share * options.runs / len(get_args(PlaceName)))
+            n = max(1, round(share * options.runs / len(get_args(PlaceName))))
             runs = [PushRun(place, pilot, options.seed + k) for k in range(n)]
             kept = [run_push(run) for run in runs]
             left = [run_push(replace(run, with_bumper=False)) for run in runs]

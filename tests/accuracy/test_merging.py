@@ -14,9 +14,11 @@ from bentwing.base.errors import InputError, UsageError
 from bentwing.base.trajectory import read_tum
 from bentwing.evaluate.simulated import merged_score
 from bentwing.evaluate.trajectory import absolute_error
+from bentwing.recording import Payload
 from bentwing.run.flights import map_flights
 from bentwing.run.merging import merge
 from bentwing.run.pipeline import map_recording
+from bentwing.run.settings import RunSettings
 from bentwing.simulate import Scenario, simulate
 from bentwing.simulate.knock import knocked
 
@@ -37,13 +39,18 @@ def flights(made_once):
     return make("office", 31, 3101), make("office", 31, 3102), make("forest", 31, 3103)
 
 
+def settings_of(payload):
+    return RunSettings(payload=Payload.load(payload), threads=2)
+
+
 @pytest.fixture(scope="module")
 def merged(flights, made_once):
     """All of them mapped and merged by one call."""
 
     def fill(folder):
         recordings = [[flight / "recording.bag"] for flight in flights]
-        map_flights(recordings, flights[0] / "payload.yaml", folder, threads=2)
+        payload = flights[0] / "payload.yaml"
+        map_flights(recordings, folder, settings_of(payload), payload)
 
     out = made_once("merged-flights", fill)
     runs = sorted((out / "runs").iterdir(), key=lambda p: p.name)
@@ -110,7 +117,8 @@ def test_flights_that_are_mapped_already_are_not_mapped_again(flights, merged, t
     shutil.copytree(merged.out, out)
     before = {run: (out / "runs" / run.name / "run.json").read_bytes() for run in merged.runs}
     recordings = [[flight / "recording.bag"] for flight in flights]
-    map_flights(recordings, flights[0] / "payload.yaml", out, threads=2, resume=True)
+    payload = flights[0] / "payload.yaml"
+    map_flights(recordings, out, settings_of(payload), payload, resume=True)
     for run, record in before.items():
         assert (out / "runs" / run.name / "run.json").read_bytes() == record
     assert (out / "map_1" / "map.laz").read_bytes() == (

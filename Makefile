@@ -82,7 +82,7 @@ wheel: setup ## build the wheel into dist/
 test: test-rust test-python ## all fast tests
 
 .PHONY: test-rust
-test-rust: setup ## the crates' tests
+test-rust: $(VENV)/.created ## the crates' tests
 	@# The optimized build of the dependencies is shared with the extension: compiling them twice takes minutes.
 	cargo test --release --workspace
 
@@ -107,7 +107,7 @@ check: check-rust check-python ## formatting, lints, types, stubs, documentation
 	$(BIN)/typos
 
 .PHONY: check-rust
-check-rust: setup ## rustfmt, clippy and rustdoc; warnings are errors
+check-rust: $(VENV)/.created ## rustfmt, clippy and rustdoc; warnings are errors
 	cargo fmt --all --check
 	@# With the profile of the build, which shares its macros and build scripts.
 	cargo clippy --release --workspace --all-targets -- -D warnings

@@ -4,9 +4,10 @@
 The bounds come from what an error does to the map. The lidar's ranges have σ = 10 mm:
 
 - An error of the trajectory in flight of 3 mm adds, in quadrature, 5 % to the thickness of a wall
-  that was seen along the whole flight. The README's forty flights have at most 1.7 mm.
+  that was seen along the whole flight. The ten flights in docs/benchmarks.md have
+  at most 1.5 mm.
 - The map may be 1.3 times as thick as the one made with the truth, since errors of the trajectory
-  and of the calibration come together; the README's have at most 1.14.
+  and of the calibration come together; those flights have at most 1.07.
 - The payload turns at 5 rad/s: half a millisecond of latency moves a point at 5 m by 12 mm, as much
   as the noise of its range.
 - A map that is levelled by the start alone is tilted by 3.5 to 7 mrad (the accelerometer's bias

@@ -41,5 +41,5 @@ def test_every_estimator_is_made_with_its_defaults_and_with_its_settings(name):
 def test_live_odometry_takes_the_same_names_and_settings():
     with pytest.raises(UsageError, match="'slam' is not known; choose continuous, kalman or ndt"):
         Odometry(HEAD, estimator="slam")
-    with pytest.raises(TypeError, match="settings: expected ContinuousSettings"):
+    with pytest.raises(TypeError, match="settings: expected a ContinuousSettings"):
         Odometry(HEAD, settings=KalmanSettings())

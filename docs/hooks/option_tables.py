@@ -75,10 +75,10 @@ def setting_row(name: str, field: FieldInfo) -> tuple[str, ...]:
             for one in field.metadata
             if getattr(one, attribute, None) is not None
         ]
-    if isinstance(field.default, BaseModel):
+    value = field.get_default(call_default_factory=True)
+    default = _code(value)
+    if isinstance(value, BaseModel):
         name, default = f"{name}.…", ""
-    else:
-        default = _code(field.default)
     return f"`{name}`", default, "".join(units), ", ".join(bounds), str(field.description)
 
 

@@ -24,7 +24,7 @@ def explain(error: Any) -> str:  # noqa: ANN401 - typer hides the click it carri
     message = " ".join(error.format_message().replace("Value error, ", "").split()).rstrip(".")
     if hasattr(error, "possibilities"):  # no such option
         parameters = [] if context is None else context.command.get_params(context)
-        known = [name for parameter in parameters for name in parameter.opts]
+        known = [n for parameter in parameters for n in parameter.opts if n.startswith("-")]
         message = error.message + did_you_mean(error.option_name, known)
     elif " is not one of " in message:
         # The choice that was made stands before those that can be made, all in quotes.

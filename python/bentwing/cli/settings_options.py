@@ -9,6 +9,7 @@ import yaml
 
 from bentwing.base.errors import InputError, UsageError
 from bentwing.base.plain import plain
+from bentwing.base.yaml_files import read_yaml
 from bentwing.recording import Payload
 from bentwing.run.settings import EstimatorName, RunSettings, validated
 
@@ -50,16 +51,10 @@ def choose(
 
 def read_settings(path: Path) -> dict[str, Any]:
     """Return what a settings file says, which may be a part of what --print-settings prints."""
-    try:
-        values = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        msg = f"{path}: no such file; give settings as `bentwing map --print-settings` prints them"
-        raise InputError(msg) from None
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        msg = f"{path}: cannot be read as YAML ({' '.join(str(error).split())})"
-        raise InputError(msg) from None
+    advice = "give settings as `bentwing map --print-settings` prints them"
+    values = read_yaml(path, advice, InputError)
     if not isinstance(values, dict):
-        msg = f"{path}: expected settings as `bentwing map --print-settings` prints them"
+        msg = f"{path}: holds no settings; {advice}"
         raise InputError(msg)
     validated(RunSettings, values, path, InputError)
     return values

@@ -136,17 +136,13 @@ def _scenario(choices: dict[str, object]) -> "Scenario":
     from pydantic import ValidationError
 
     from bentwing.base.errors import UsageError
+    from bentwing.base.validation import describe
     from bentwing.simulate import Scenario
 
     try:
         return Scenario.model_validate(choices)
     except ValidationError as error:
-        wrong = "; ".join(
-            f"{'.'.join(map(str, e['loc']))}: {e['msg']}, got {e['input']!r}"
-            for e in error.errors()
-        )
-        msg = f"this cannot be simulated: {wrong}"
-        raise UsageError(msg) from error
+        raise UsageError(describe(error, Scenario, "this cannot be simulated")) from None
 
 
 def _run(scenario: "Scenario", out: Path, *, quiet: bool) -> None:

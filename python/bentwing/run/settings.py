@@ -12,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 from bentwing.base.errors import BentwingError, UsageError
 from bentwing.base.plain import plain
 from bentwing.base.units import Metres, Unit
+from bentwing.base.validation import describe
 from bentwing.closing.georeference.settings import GeoreferenceSettings
 from bentwing.closing.global_registration.settings import GlobalSettings
 from bentwing.map.clean import CleanSettings
@@ -21,7 +22,6 @@ from bentwing.odometry.continuous.settings import ContinuousSettings
 from bentwing.odometry.kalman.settings import KalmanSettings
 from bentwing.odometry.ndt.settings import NdtSettings
 from bentwing.recording import Payload
-from bentwing.recording.payload_errors import describe
 
 EstimatorName = Literal["continuous", "kalman", "ndt"]
 MapFormat = Literal["laz", "las", "ply", "pcd", "e57"]

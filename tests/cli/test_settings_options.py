@@ -182,13 +182,13 @@ def test_settings_reach_the_pipeline(bentwing, called, written, head, command):
 @pytest.mark.parametrize(
     ("text", "options", "code", "says"),
     [
-        (None, ["--set", "windw=4"], 2, "--set: continuous: unknown key 'windw'; did you mean 'window'?"),
+        (None, ["--set", "windows=4"], 2, "--set: continuous: unknown key 'windows'; did you mean 'window'?"),
         (None, ["--set", "surfels.n_level=4"], 2, "did you mean 'n_levels'?"),
         (None, ["--set", "window=-4"], 2, "--set: continuous.window: input should be greater than 0"),
         (None, ["--set", "window=long"], 2, "found 'long'"),
         (None, ["--set", "map_format=obj"], 2, "'obj'"),
-        ("continuous: {windw: 4}", [], 3, "settings.yaml: continuous: unknown key 'windw'; did you mean"),
-        ("contiuous: {window: 4}", [], 3, "unknown key 'contiuous'; did you mean 'continuous'?"),
+        ("continuous: {windows: 4}", [], 3, "settings.yaml: continuous: unknown key 'windows'; did you mean"),
+        ("continuum: {window: 4}", [], 3, "unknown key 'continuum'; did you mean 'continuous'?"),
         ("window: 4", [], 3, "settings.yaml: unknown key 'window'; valid are map_format,"),
         ("continuous: 4", [], 3, "settings.yaml: continuous: input should be"),
         ("a: b: c", [], 3, "not valid YAML"),

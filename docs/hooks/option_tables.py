@@ -15,7 +15,8 @@ from pydantic import BaseModel
 from bentwing.base.units import Unit
 from bentwing.cli.command import rank
 from bentwing.cli.commands import load
-from bentwing.run.settings import EstimatorName, RunSettings
+from bentwing.odometry import EstimatorName
+from bentwing.run.settings import RunSettings
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -14,9 +14,10 @@ import pytest
 from bentwing.cli import choices
 from bentwing.cli.commands import COMMANDS, load
 from bentwing.cli.main import run_command
-from bentwing.closing.georeference.settings import Mode
+from bentwing.closing import GeoreferenceMode
+from bentwing.map import MapFormat
+from bentwing.odometry import EstimatorName
 from bentwing.reproduce import PARTS
-from bentwing.run import settings
 from bentwing.simulate import events, gnss, scenario
 
 # typer itself takes pydantic, as soon as a command has options.
@@ -128,9 +129,9 @@ def test_an_example_of_a_help_page_can_be_typed(command, line):
 
 
 def test_the_choices_of_options_are_those_there_are():
-    assert choices.EstimatorName == settings.EstimatorName
-    assert choices.MapFormat == settings.MapFormat
-    assert choices.GeoreferenceMode == Mode
+    assert choices.EstimatorName == EstimatorName
+    assert choices.MapFormat == MapFormat
+    assert choices.GeoreferenceMode == GeoreferenceMode
     assert get_args(choices.PaperName) == tuple(PARTS)
     assert {one.value for one in choices.PartName} == {name for p in PARTS.values() for name in p}
     for name in ("SceneName", "HeadName", "SpinName", "FlightName"):

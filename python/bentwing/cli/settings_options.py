@@ -10,8 +10,9 @@ import yaml
 from bentwing.base.errors import InputError, UsageError
 from bentwing.base.plain import plain
 from bentwing.base.yaml_files import read_yaml
+from bentwing.cli.choices import EstimatorName
 from bentwing.recording import Payload
-from bentwing.run.settings import EstimatorName, RunSettings, validated
+from bentwing.run.settings import RunSettings, validated
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping

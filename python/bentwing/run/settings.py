@@ -16,17 +16,19 @@ from bentwing.base.validation import describe
 from bentwing.closing.georeference.settings import GeoreferenceSettings
 from bentwing.closing.global_registration.settings import GlobalSettings
 from bentwing.map.clean import CleanSettings
-from bentwing.map.writer import require_format
-from bentwing.odometry import ESTIMATORS, require_estimator
-from bentwing.odometry.continuous.settings import ContinuousSettings
-from bentwing.odometry.kalman.settings import KalmanSettings
-from bentwing.odometry.ndt.settings import NdtSettings
+from bentwing.map.writer import MapFormat, require_format
+from bentwing.odometry import (
+    ESTIMATORS,
+    ContinuousSettings,
+    EstimatorName,
+    EstimatorSettings,
+    KalmanSettings,
+    NdtSettings,
+    require_estimator,
+)
 from bentwing.recording import Payload
 
-EstimatorName = Literal["continuous", "kalman", "ndt"]
-MapFormat = Literal["laz", "las", "ply", "pcd", "e57"]
 _Model = TypeVar("_Model", bound=BaseModel)
-EstimatorSettings = ContinuousSettings | KalmanSettings | NdtSettings
 
 
 class MapSettings(BaseModel):

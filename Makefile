@@ -142,7 +142,7 @@ bench: $(CORE) ## kernels (criterion), then accuracy and speed from recording to
 	$(BIN)/python -m benches pipeline $(SCENARIOS)
 
 .PHONY: docs
-docs: $(VENV)/.docs-tools ## build the documentation into site/
+docs: $(VENV)/.docs-tools $(CORE) ## build the documentation into site/
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
 # Not with the developer's environment: what a user does, from the clone to the map.

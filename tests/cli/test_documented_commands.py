@@ -59,7 +59,10 @@ def parse(line: str) -> None:
     """Parse a line as the command line does, without running the command."""
     _, *words = shlex.split(line, comments=True)
     if words[0].startswith("-"):  # an option of bentwing itself
-        assert words in (["--help"], ["--version"])
+        known = {
+            name for parameter in typer.main.get_command(app).params for name in parameter.opts
+        }
+        assert set(words) <= {"--help", *known}
         return
     command, rest, context = resolve(*words)
     with suppress(typer.Exit):  # --help

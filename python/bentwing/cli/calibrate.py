@@ -1,29 +1,28 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
 """`bentwing calibrate`: the transforms and clocks of a sensor head."""
 
-from __future__ import annotations
-
-from pathlib import Path  # noqa: TC003 - typer reads the annotations
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from bentwing.cli import options
 
-def calibrate_command(  # noqa: PLR0917 - one parameter per option
-    recording: Annotated[list[Path], typer.Argument(help="Recording, or its consecutive parts.")],
-    out: Annotated[Path, typer.Option("-o", "--out", help="Folder to write into.")],
-    payload: Annotated[
-        Path, typer.Option(help="payload.yaml, the description of the sensor head.")
-    ],
-    threads: Annotated[int | None, typer.Option(help="Default: all cores.", min=1)] = None,
-    start: Annotated[
-        float | None, typer.Option(help="Seconds to skip at the start.", min=0)
-    ] = None,
-    duration: Annotated[
-        float | None, typer.Option(help="Seconds of the recording to use.", min=0)
-    ] = None,
+EXAMPLES = (
+    "bentwing calibrate recording.bag -p payload.yaml -o calibration",
+    "bentwing calibrate recording.bag -p payload.yaml -o calibration --start 10 --duration 30",
+)
+
+
+def command(
+    recording: options.Recording,
     *,
-    quiet: Annotated[bool, typer.Option("--quiet", help="Say nothing but errors.")] = False,
+    out: options.Out,
+    payload: Annotated[Path, options.payload()],
+    threads: options.Threads = None,
+    start: options.Start = None,
+    duration: options.Duration = None,
+    quiet: options.Quiet = False,
 ) -> None:
     """Calibrate a sensor head: payload.yaml with standard deviations, and a wall before and after.
 
@@ -36,7 +35,7 @@ def calibrate_command(  # noqa: PLR0917 - one parameter per option
     from bentwing.base.progress import create_progress
     from bentwing.calibrate import calibrate
     from bentwing.calibrate.folder import CalibrationFolder
-    from bentwing.cli.calibration_page import page
+    from bentwing.cli.calibrate_page import page
     from bentwing.report import draw_wall
 
     folder = CalibrationFolder(out)

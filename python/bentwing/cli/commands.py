@@ -9,30 +9,21 @@ from typing import Any
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-# name: module, function, and what the list of commands says about it
+from bentwing.cli.command import CONTEXT, Command, closing
+from bentwing.cli.mistakes import did_you_mean
+
+# What the list of commands says about each; the command is `bentwing.cli.<name>.command`.
 COMMANDS = {
-    "map": ("map", "map_command", "Turn a recording into a trajectory, a map and a report."),
-    "localize": (
-        "localize",
-        "localize_command",
-        "Find a recording in a map, and what has changed.",
-    ),
-    "merge": ("merge", "merge_command", "Put several runs into one map."),
-    "info": ("info", "info", "Tell whether a recording is fit for mapping."),
-    "calibrate": (
-        "calibrate",
-        "calibrate_command",
-        "Calibrate a sensor head: the lidar on its motor, the IMU, the clocks.",
-    ),
-    "plan": ("plan", "plan_command", "Plan a flight: how fast to spin, what will be seen."),
-    "evaluate": (
-        "evaluate",
-        "evaluate_command",
-        "Measure the errors of a trajectory and a map.",
-    ),
-    "view": ("view", "view_command", "Show a run: map, path and windows over time."),
-    "simulate": ("simulate", "simulate_command", "Simulate a recording with truth."),
-    "reproduce": ("reproduce", "reproduce_command", "Make a paper's figures and tables again."),
+    "map": "Turn a recording into a trajectory, a map and a report.",
+    "localize": "Find a recording in a map, and what has changed.",
+    "merge": "Put several runs into one map.",
+    "info": "Tell whether a recording is fit for mapping.",
+    "calibrate": "Calibrate a sensor head: motor, IMU and clocks.",
+    "plan": "Plan a flight: how fast to spin, what will be seen.",
+    "evaluate": "Measure the errors of a trajectory and a map.",
+    "view": "Show a run: map, path and windows over time.",
+    "simulate": "Simulate a recording with truth.",
+    "reproduce": "Make a paper's figures and tables again.",
 }
 
 
@@ -45,16 +36,27 @@ class LazyCommands(TyperGroup):
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:  # noqa: ANN401, ARG002
         """Return what the list of commands shows, without importing the command."""
-        return TyperCommand(cmd_name, help=COMMANDS[cmd_name][2]) if cmd_name in COMMANDS else None
+        return TyperCommand(cmd_name, help=COMMANDS[cmd_name]) if cmd_name in COMMANDS else None
+
+    def format_epilog(self, ctx: Any, formatter: Any) -> None:  # noqa: ANN401, ARG002
+        """Write examples and exit codes, line by line."""
+        formatter.write(self.epilog)
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:  # noqa: ANN401
         """Return the command itself."""
-        name, command, rest = super().resolve_command(ctx, args)
-        return name, _load(name) if name in COMMANDS else command, rest
+        name, *rest = args
+        if name in COMMANDS:
+            return name, load(name), rest
+        if not ctx.resilient_parsing:
+            ctx.fail(f"No such command: {name}{did_you_mean(name, COMMANDS)}")
+        return None, None, rest
 
 
-def _load(name: str) -> Any:  # noqa: ANN401 - a command of typer's own click
-    module, function, _ = COMMANDS[name]
-    app = typer.Typer(add_completion=False)
-    app.command(name)(getattr(import_module(f"bentwing.cli.{module}"), function))
+def load(name: str) -> Any:  # noqa: ANN401 - a command of typer's own click
+    """Import a command."""
+    module = import_module(f"bentwing.cli.{name}")
+    app = typer.Typer(add_completion=False, rich_markup_mode=None)
+    app.command(name, cls=Command, context_settings=CONTEXT, epilog=closing(module.EXAMPLES))(
+        module.command
+    )
     return typer.main.get_command(app)

@@ -1,47 +1,68 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
 """`bentwing evaluate`: the evidence about a trajectory and a map."""
 
-from __future__ import annotations
-
 import math
-from pathlib import Path  # noqa: TC003 - typer reads the annotations
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from bentwing.cli import options
+from bentwing.cli.options import INPUT, option
 
-def evaluate_command(
+EXAMPLES = (
+    "bentwing evaluate run",
+    "bentwing evaluate run --reference-trajectory truth.txt --reference-map scan.laz",
+    "bentwing evaluate trajectory.txt --reference-trajectory truth.txt -o evaluation",
+)
+
+
+def command(
     run: Annotated[
-        Path, typer.Argument(help="Run folder, or a TUM trajectory or a cloud of any program.")
+        Path,
+        typer.Argument(
+            metavar="RUN",
+            help="Run folder, or a TUM trajectory or a cloud of any program.",
+            rich_help_panel=INPUT,
+        ),
     ],
     *,
     reference_trajectory: Annotated[
-        Path | None, typer.Option(help="Lines `t x y z` or `t x y z qx qy qz qw` (TUM, CSV).")
+        Path | None,
+        option(INPUT, metavar="FILE", help="Lines `t x y z` or `t x y z qx qy qz qw` (TUM, CSV)."),
     ] = None,
     reference_map: Annotated[
-        Path | None, typer.Option(help="Cloud (laz, las, ply, pcd, e57) or PLY mesh.")
-    ] = None,
-    out: Annotated[
         Path | None,
-        typer.Option("-o", "--out", help="Folder to write into.", show_default="RUN/evaluation"),
+        option(INPUT, metavar="FILE", help="Cloud (laz, las, ply, pcd, e57) or PLY mesh."),
     ] = None,
     clock_offset: Annotated[
         float | None,
-        typer.Option(
-            help="Seconds by which the clock of the reference is ahead.", show_default="estimated"
+        option(
+            INPUT,
+            metavar="SECONDS",
+            help="By how much the clock of the reference is ahead.",
+            show_default="estimated",
         ),
     ] = None,
     lever_arm: Annotated[
         str | None,
-        typer.Option(
-            help="Tracked point in the IMU frame, x,y,z in metres.",
+        option(
+            INPUT,
+            metavar="X,Y,Z",
+            help="Tracked point in the IMU frame, m.",
             show_default="estimated for positions, 0,0,0 for poses",
         ),
     ] = None,
     changed_beyond: Annotated[
-        float, typer.Option(help="Metres from the reference map beyond which things have changed.")
+        float,
+        option(
+            INPUT,
+            metavar="METRES",
+            help="Distance from the reference map beyond which things have changed.",
+        ),
     ] = 0.3,
-    quiet: Annotated[bool, typer.Option("--quiet", help="Say nothing but errors.")] = False,
+    out: Annotated[Path | None, options.out(show_default="RUN/evaluation")] = None,
+    quiet: options.Quiet = False,
 ) -> None:
     """Measure the errors of a trajectory and a map: evaluation.json, figures and a table."""
     # slow to import, so only when it is needed
@@ -49,7 +70,7 @@ def evaluate_command(
 
     from bentwing.base.errors import UsageError
     from bentwing.base.progress import create_progress
-    from bentwing.cli.evaluation_table import tables
+    from bentwing.cli.evaluate_page import page
     from bentwing.evaluate.evaluation import Question, evaluate
     from bentwing.evaluate.folder import EvaluationFolder
     from bentwing.evaluate.subject import find_subject
@@ -74,7 +95,7 @@ def evaluate_command(
     if quiet:
         return
     console = Console()
-    for part in tables(result):
+    for part in page(result):
         console.print(part)
     typer.echo(f"{folder.path}: evaluation.json and figures")
 

@@ -1,36 +1,30 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""The command `bentwing info`: is this recording fit for mapping."""
-
-from __future__ import annotations
-
-import dataclasses
-import json
-from pathlib import Path  # noqa: TC003 - typer reads the annotations
-from typing import Annotated
+"""`bentwing info`: whether a recording is fit for mapping."""
 
 import typer
-from rich.console import Console
 
-from bentwing.calibrate.inspection import inspect
-from bentwing.cli.info_page import page
+from bentwing.cli import options
+
+EXAMPLES = (
+    "bentwing info recording.bag",
+    "bentwing info recording.bag -p payload.yaml",
+    "bentwing info part1.bag part2.bag --json",
+)
 
 
-def info(
-    recording: Annotated[
-        list[Path],
-        typer.Argument(
-            help="ROS 1 .bag, ROS 2 bag folder, .db3, .mcap or .pcap; several parts of one."
-        ),
-    ],
-    payload: Annotated[
-        Path | None, typer.Option("--payload", "-p", help="payload.yaml of the sensor head.")
-    ] = None,
-    *,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print one JSON object instead of the page.")
-    ] = False,
+def command(
+    recording: options.Recording, *, payload: options.Payload = None, as_json: options.Json = False
 ) -> None:
     """Tell topics, rates, gaps, spin, stalls and visible structure, and whether mapping can work."""
+    # slow to import, so only when it is needed
+    import dataclasses
+    import json
+
+    from rich.console import Console
+
+    from bentwing.calibrate.inspection import inspect
+    from bentwing.cli.info_page import page
+
     inspection = inspect(recording, payload)
     if as_json:
         typer.echo(json.dumps({**dataclasses.asdict(inspection), "is_fit": inspection.is_fit}))

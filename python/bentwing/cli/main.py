@@ -10,25 +10,33 @@ from typing import Annotated
 
 import typer
 
-from bentwing.base.errors import BentwingError
+from bentwing.base.errors import BentwingError, UsageError
+from bentwing.cli.command import CONTEXT, closing
 from bentwing.cli.commands import LazyCommands
+from bentwing.cli.mistakes import explain
 
 INTERRUPTED = 130
 _UNEXPECTED = 70  # EX_SOFTWARE of sysexits.h
 _DEBUG = "BENTWING_DEBUG"
 
-# typer carries its own copy of click in some versions; the base of its errors is found through
-# the one class it has always shown.
+# typer hides the click it carries; the base of its errors is found through the one class it shows.
 _CommandLineError: type[Exception] = next(
     base for base in typer.BadParameter.__mro__ if base.__name__ == "ClickException"
+)
+
+_EXAMPLES = (
+    "bentwing simulate courtyard -o recording --duration 30",
+    "bentwing map recording/recording.bag -p recording/payload.yaml -o run",
+    "bentwing map --help",
 )
 
 app = typer.Typer(
     name="bentwing",
     cls=LazyCommands,
     help="Accurate trajectories and 3D maps from lidars that move on their carrier, without GNSS.",
-    no_args_is_help=True,
-    add_completion=False,
+    context_settings=CONTEXT,
+    epilog=closing(_EXAMPLES),
+    rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
 
@@ -64,14 +72,15 @@ def run() -> None:
 
 def run_command(arguments: list[str]) -> int:
     """Run one command; return its exit code, having said in one sentence what went wrong."""
+    if not arguments:
+        run_command(["--help"])
+        return UsageError.exit_code
     try:
         result = app(arguments, prog_name="bentwing", standalone_mode=False)
     except BentwingError as error:
         return _fail(str(error), error.exit_code)
     except _CommandLineError as error:
-        message = getattr(error, "format_message", error.__str__)()
-        # bare `bentwing` raises an error whose message is the help
-        return _fail(f"{message.rstrip('.')}; see `bentwing --help`" if message else "", 2)
+        return _fail(explain(error), UsageError.exit_code)
     except (KeyboardInterrupt, typer.Abort):
         return _fail("interrupted", INTERRUPTED)
     except BrokenPipeError:
@@ -89,8 +98,7 @@ def run_command(arguments: list[str]) -> int:
 
 
 def _fail(message: str, code: int) -> int:
-    if message:
-        print(f"bentwing: error: {message}", file=sys.stderr)
+    print(f"bentwing: error: {message}", file=sys.stderr)
     return code
 
 

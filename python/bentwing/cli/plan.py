@@ -1,44 +1,68 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
 """`bentwing plan`: how fast to spin a head, and what comes of it."""
 
-from __future__ import annotations
-
-import json
-import math
-from pathlib import Path  # noqa: TC003 - typer reads the annotations
+from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
-from bentwing.base.atomic import write_text
-from bentwing.cli.plan_page import as_record, page
-from bentwing.flight.plan import Intent, plan_flight
+from bentwing.cli import options
+from bentwing.cli.options import INPUT, RESULT, option
 
-Option = typer.Option
+EXAMPLES = (
+    "bentwing plan payload.yaml",
+    "bentwing plan payload.yaml --distance 10 --speed 3 --picture sphere.svg",
+)
 
 
-def plan_command(  # noqa: PLR0917 - one parameter per option
-    payload: Annotated[Path, typer.Argument(help="payload.yaml of the sensor head.")],
-    distance: Annotated[float, Option(help="To the structure, m.")] = 5.0,
-    speed: Annotated[float, Option(help="Of the carrier, m/s.")] = 2.0,
-    voxel_size: Annotated[float, Option(help="Of the finest surfels, m.")] = 0.4,
-    window: Annotated[float, Option(help="Of the estimator, s.")] = 5.0,
+def command(  # noqa: PLR0917 - one parameter per option
+    payload: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE",
+            help="Description of the sensor head, payload.yaml.",
+            rich_help_panel=INPUT,
+        ),
+    ],
+    distance: Annotated[float, option(INPUT, metavar="METRES", help="To the structure.")] = 5.0,
+    speed: Annotated[float, option(INPUT, metavar="M/S", help="Of the carrier.")] = 2.0,
+    voxel_size: Annotated[
+        float, option(INPUT, metavar="METRES", help="Of the finest surfels.")
+    ] = 0.4,
+    window: Annotated[float, option(INPUT, metavar="SECONDS", help="Of the estimator.")] = 5.0,
     scan_rate: Annotated[
-        float | None, Option(help="Sweeps per second.", show_default="of the lidar's kind")
+        float | None,
+        option(INPUT, metavar="HZ", help="Sweeps per second.", show_default="of the lidar's kind"),
     ] = None,
     beam_step: Annotated[
-        float | None, Option(help="Between beams, °.", show_default="of the lidar's kind")
+        float | None,
+        option(
+            INPUT,
+            metavar="DEGREES",
+            help="Angle between beams.",
+            show_default="of the lidar's kind",
+        ),
     ] = None,
-    area: Annotated[float, Option(help="Of the site, m².")] = 2500.0,
-    flight_time: Annotated[float, Option(help="Of one battery, min.")] = 10.0,
+    area: Annotated[float, option(INPUT, metavar="M²", help="Of the site.")] = 2500.0,
+    flight_time: Annotated[float, option(INPUT, metavar="MINUTES", help="Of one battery.")] = 10.0,
     picture: Annotated[
-        Path | None, Option(help="Write the map of the sphere as SVG.", show_default=False)
+        Path | None,
+        option(RESULT, metavar="FILE", help="Write a map of what the head sees as SVG."),
     ] = None,
     *,
-    as_json: Annotated[bool, Option("--json", help="Print one JSON object instead.")] = False,
+    as_json: options.Json = False,
 ) -> None:
     """Tell acceptable spin rates, point spacing, coverage and flight time for this head."""
+    # slow to import, so only when it is needed
+    import json
+    import math
+
+    from rich.console import Console
+
+    from bentwing.base.atomic import write_text
+    from bentwing.cli.plan_page import as_record, page
+    from bentwing.flight.plan import Intent, plan_flight
+
     intent = Intent(
         distance=distance,
         speed=speed,

@@ -1,56 +1,71 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
 """`bentwing reproduce`: a paper's figures and tables, made again."""
 
-from __future__ import annotations
-
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, get_args
 
 import typer
 
-Option = typer.Option
+from bentwing.cli import options
+from bentwing.cli.choices import PaperName, PartName
+from bentwing.cli.options import ESTIMATION, INPUT, option
+
+EXAMPLES = (
+    "bentwing reproduce kaul2015 -o kaul2015",
+    "bentwing reproduce kaul2015 --part flight --quick",
+    "bentwing reproduce tazir2020 --quick --seed 2 -o tazir2020",
+)
 
 
-def reproduce_command(
-    paper: Annotated[str, typer.Argument(help="kaul2015, fu2023 or tazir2020.")],
-    out: Annotated[
-        Path | None, Option("-o", "--out", help="Folder to write into.", show_default="PAPER")
-    ] = None,
-    part: Annotated[
-        list[str] | None,
-        Option(help="Repeatable: mapping, flight.", show_default="all of the paper's"),
-    ] = None,
+def command(
+    paper: Annotated[
+        PaperName,
+        typer.Argument(
+            metavar="PAPER",
+            help=f"Paper to reproduce: {', '.join(get_args(PaperName))}.",
+            rich_help_panel=INPUT,
+        ),
+    ],
     *,
-    seed: Annotated[int, Option(help="Of all that is random.", min=0)] = 1,
-    quick: Annotated[bool, Option("--quick", help="Less of everything, in minutes.")] = False,
-    quiet: Annotated[bool, Option("--quiet", help="Say nothing but errors.")] = False,
+    part: Annotated[
+        list[PartName],
+        option(
+            INPUT,
+            "--part",
+            metavar="NAME",
+            help="Make one part only, repeatable: mapping, flight.",
+            show_default="all of the paper's",
+        ),
+    ] = [],  # noqa: B006 - typer reads it and hands out a copy
+    seed: Annotated[
+        int, option(ESTIMATION, metavar="N", help="Seed of all that is random.", min=0)
+    ] = 1,
+    quick: Annotated[
+        bool, option(ESTIMATION, "--quick", help="Fly shorter: minutes instead of hours.")
+    ] = False,
+    out: Annotated[Path | None, options.out(show_default="PAPER")] = None,
+    quiet: options.Quiet = False,
 ) -> None:
     """Make a paper's tables and figures again: report.html, figures as PNG and SVG, numbers as JSON."""
     # slow to import, so only when it is needed
     from rich.console import Console
-    from rich.table import Table
 
     from bentwing.base.progress import create_progress
+    from bentwing.cli.reproduce_page import page
     from bentwing.reproduce import reproduce
 
     progress = create_progress(quiet=quiet)
     written = reproduce(
-        paper, out or Path(paper), part or (), quick=quick, seed=seed, progress=progress
+        paper,
+        out or Path(paper),
+        [one.value for one in part],
+        quick=quick,
+        seed=seed,
+        progress=progress,
     )
     if quiet:
         return
     console = Console()
-    for made in written.parts:
-        for shown in made.tables:
-            typer.echo(shown.markdown())
-        if made.compared:
-            table = Table(title=made.title, title_justify="left", box=None)
-            for heading in ("", "paper", "bentwing", "aim", ""):
-                table.add_column(heading)
-            for row in made.compared:
-                table.add_row(row.what, row.paper, row.ours, row.aim, _MET[row.met])
-            console.print(table)
+    for part_of_page in page(written):
+        console.print(part_of_page, highlight=False, markup=False, soft_wrap=True)
     typer.echo(f"{written.page}: {len(written.figures)} figures, also as files beside it")
-
-
-_MET = {True: "[green]met[/green]", False: "[red]missed[/red]", None: ""}

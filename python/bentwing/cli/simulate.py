@@ -1,72 +1,114 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
 """`bentwing simulate`: a recording with truth."""
 
-from __future__ import annotations
-
-from pathlib import Path  # noqa: TC003 - typer reads the annotations
-from typing import Annotated, get_args
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, get_args
 
 import typer
-from pydantic import ValidationError
-from rich.console import Console
-from rich.progress import Progress
 
-from bentwing.base.errors import UsageError
-from bentwing.simulate import Scenario, simulate
-from bentwing.simulate.events import EventName
-from bentwing.simulate.scenario import FlightName, HeadName, SceneName
+from bentwing.cli import options
+from bentwing.cli.choices import (
+    EventName,
+    FlightName,
+    HeadName,
+    ReceiverName,
+    RecordingFormat,
+    SceneName,
+    SpinName,
+)
+from bentwing.cli.options import RESULT, option
 
-Option = typer.Option
+if TYPE_CHECKING:
+    from bentwing.simulate import Scenario
+
+EXAMPLES = (
+    "bentwing simulate courtyard -o recording --duration 30",
+    "bentwing simulate office --head vlp16-motor --flight stand -o stand",
+    "bentwing simulate town --gnss rtk --format mcap -o town",
+    "bentwing simulate office --event spin-stall --stall 10 -o stall",
+)
+
+WORLD = "World and flight"
+HEAD = "Sensor head"
+TROUBLE = "Errors"
 
 
-def _names(choices: object) -> str:
-    return ", ".join(get_args(choices))
-
-
-def simulate_command(  # noqa: PLR0917 - one parameter per option
-    scenario: Annotated[str, typer.Argument(help=f"One of {_names(SceneName)}.")],
-    out: Annotated[Path, Option("--output", "-o", help="Folder to write into.")],
+def command(
+    scenario: Annotated[
+        SceneName,
+        typer.Argument(
+            metavar="SCENARIO",
+            help=f"World to fly in: {', '.join(get_args(SceneName))}.",
+            rich_help_panel=WORLD,
+        ),
+    ],
+    *,
+    out: Annotated[Path, options.out("--output")],
+    duration: Annotated[
+        float, option(WORLD, metavar="SECONDS", help="Length of the recording.")
+    ] = 60.0,
+    seed: Annotated[
+        int,
+        option(WORLD, metavar="N", help="Seed of geometry, motion, calibration and noise."),
+    ] = 0,
+    flight_seed: Annotated[
+        int | None,
+        option(
+            WORLD,
+            metavar="N",
+            help="Seed of all but the geometry: another flight in the world of --seed.",
+        ),
+    ] = None,
+    flight: Annotated[
+        FlightName | None,
+        option(WORLD, help="Kind of flight.", show_default="tour; walls, dam: survey"),
+    ] = None,
+    speed: Annotated[
+        float | None,
+        option(WORLD, metavar="M/S", help="About, of a tour.", show_default="the scene's"),
+    ] = None,
     head: Annotated[
-        str | None,
-        Option(
-            help=f"One of {_names(HeadName)}.",
+        HeadName | None,
+        option(
+            HEAD,
+            help="Sensor head, and how it is moved.",
             show_default="hokuyo-spin; town, walls, dam: vlp16-motor",
         ),
     ] = None,
-    duration: Annotated[float, Option(help="Length of the recording, s.")] = 60.0,
-    seed: Annotated[int, Option(help="Varies geometry, motion, calibration and noise.")] = 0,
-    flight_seed: Annotated[
-        int | None,
-        Option(help="Varies all but the geometry: another flight in the world of --seed."),
-    ] = None,
-    bag_format: Annotated[
-        str, Option("--format", help="bag (ROS 1), or mcap or db3 (ROS 2).")
-    ] = "bag",
-    motor_rate: Annotated[float, Option(help="Rate of vlp16-motor, rad/s.")] = 1.0,
+    motor_rate: Annotated[float, option(HEAD, metavar="RAD/S", help="Rate of vlp16-motor.")] = 1.0,
     spin: Annotated[
-        str, Option(help="Of hokuyo-spin: steady, or plant (downdraft, vanes and controller).")
+        SpinName,
+        option(HEAD, help="Of hokuyo-spin: plant is downdraft, vanes and controller."),
     ] = "steady",
     max_range: Annotated[
-        float | None, Option(help="The lidar sees up to here, m.", show_default="the sensor's")
-    ] = None,
-    speed: Annotated[
-        float | None, Option(help="Of a tour, about, m/s.", show_default="the scene's")
-    ] = None,
-    flight: Annotated[
-        str | None,
-        Option(help=f"One of {_names(FlightName)}.", show_default="survey where there is no tour"),
+        float | None,
+        option(HEAD, metavar="METRES", help="Reach of the lidar.", show_default="the sensor's"),
     ] = None,
     gnss: Annotated[
-        str | None, Option(help="A receiver: rtk or single.", show_default="none")
+        ReceiverName | None, option(HEAD, help="Add a GNSS receiver.", show_default="none")
     ] = None,
     event: Annotated[
-        list[str] | None, Option(help=f"Repeatable: {_names(EventName)}.", show_default=False)
-    ] = None,
-    stall: Annotated[float, Option(help="How long the head stands still in spin-stall, s.")] = 4.0,
-    *,
+        list[EventName],
+        option(
+            TROUBLE,
+            "--event",
+            metavar="NAME",
+            help=f"What goes wrong, repeatable: {', '.join(one.value for one in EventName)}.",
+            show_default=False,
+        ),
+    ] = [],  # noqa: B006 - typer reads it and hands out a copy
+    stall: Annotated[
+        float,
+        option(TROUBLE, metavar="SECONDS", help="How long the head stands still in spin-stall."),
+    ] = 4.0,
     calibrated: Annotated[
-        bool, Option("--calibrated", help="The payload is exact, the clocks agree.")
+        bool, option(TROUBLE, "--calibrated", help="The payload is exact, the clocks agree.")
     ] = False,
+    bag_format: Annotated[
+        RecordingFormat,
+        option(RESULT, "--format", help="bag is of ROS 1, mcap and db3 are of ROS 2."),
+    ] = "bag",
+    quiet: options.Quiet = False,
 ) -> None:
     """Simulate a recording with truth: bag, payload.yaml, trajectory, scene and calibration."""
     choices: dict[str, object] = {
@@ -79,30 +121,37 @@ def simulate_command(  # noqa: PLR0917 - one parameter per option
         "motor_rate": motor_rate,
         "spin": spin,
         "max_range": max_range,
-        "events": event or (),
+        "events": [one.value for one in event],
         "stall": stall,
         "speed": speed,
         "flight": flight,
         "gnss": gnss,
         "calibrated": calibrated,
     }
-    _run(_scenario(choices), out)
+    _run(_scenario(choices), out, quiet=quiet)
 
 
-def _scenario(choices: dict[str, object]) -> Scenario:
+def _scenario(choices: dict[str, object]) -> "Scenario":
+    # slow to import, so only when it is needed
+    from pydantic import ValidationError
+
+    from bentwing.base.errors import UsageError
+    from bentwing.base.validation import describe
+    from bentwing.simulate import Scenario
+
     try:
         return Scenario.model_validate(choices)
     except ValidationError as error:
-        wrong = "; ".join(
-            f"{'.'.join(map(str, e['loc']))}: {e['msg']}, got {e['input']!r}"
-            for e in error.errors()
-        )
-        msg = f"this cannot be simulated: {wrong}"
-        raise UsageError(msg) from error
+        raise UsageError(describe(error, Scenario, "this cannot be simulated")) from None
 
 
-def _run(scenario: Scenario, out: Path) -> None:
-    console = Console()
+def _run(scenario: "Scenario", out: Path, *, quiet: bool) -> None:
+    from rich.console import Console
+    from rich.progress import Progress
+
+    from bentwing.simulate import simulate
+
+    console = Console(quiet=quiet)
     with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task(f"simulating {scenario.scene}", total=scenario.duration)
         files = simulate(scenario, out, lambda time: bar.update(task, completed=time))

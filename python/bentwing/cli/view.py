@@ -1,35 +1,59 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
 """`bentwing view`: a run in the rerun viewer."""
 
-from __future__ import annotations
-
-from pathlib import Path  # noqa: TC003 - typer reads the annotations
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
-Option = typer.Option
+from bentwing.cli import options
+from bentwing.cli.options import INPUT, RESULT, option
+
+EXAMPLES = (
+    "bentwing view run",
+    "bentwing view run --save run.rrd",
+    "bentwing view run --pictures pictures",
+    "bentwing view run --video frames --frames 500",
+)
 
 
-def view_command(  # noqa: PLR0917 - one parameter per option
-    run: Annotated[Path, typer.Argument(help="Folder that `bentwing map` has written.")],
+def command(
+    run: Annotated[
+        Path,
+        typer.Argument(
+            metavar="RUN",
+            help="Folder that `bentwing map` has written.",
+            rich_help_panel=INPUT,
+        ),
+    ],
+    *,
     save: Annotated[
-        Path | None, Option(help="Write a .rrd file instead of opening it.", show_default=False)
+        Path | None, option(RESULT, metavar="FILE", help="Write a .rrd file instead.")
     ] = None,
     max_points: Annotated[
-        int, Option(min=1000, help="Shown of the map; a larger one is thinned evenly.")
+        int,
+        option(RESULT, metavar="N", min=1000, help="Thin the map evenly to so many points."),
     ] = 3_000_000,
     pictures: Annotated[
         Path | None,
-        Option(help="Write plan and sections as PNG into this folder instead.", show_default=False),
+        option(
+            RESULT,
+            metavar="FOLDER",
+            help="Write plan and sections as PNG into this folder instead.",
+        ),
     ] = None,
     video: Annotated[
         Path | None,
-        Option(help="Write the flight as frames of a video instead.", show_default=False),
+        option(
+            RESULT,
+            metavar="FOLDER",
+            help="Write the flight as frames of a video into this folder instead.",
+        ),
     ] = None,
-    frames: Annotated[int, Option(min=1, help="Of the video.")] = 300,
-    *,
-    quiet: Annotated[bool, Option("--quiet", "-q", help="No progress.")] = False,
+    frames: Annotated[
+        int, option(RESULT, metavar="N", min=1, help="Number of frames of the video.")
+    ] = 300,
+    quiet: options.Quiet = False,
 ) -> None:
     """Show a run in rerun: the map as it grows on three levels of detail, path, surfels, windows."""
     from bentwing.base.progress import create_progress

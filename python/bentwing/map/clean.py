@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field
 
 from bentwing import _core
 from bentwing.map.spool import ChunkSpool
@@ -31,20 +31,20 @@ MARGIN = 2 * EDGE
 
 
 class CleanSettings(BaseModel):
-    """What is left out of the map.
-
-    Attributes
-    ----------
-    mixed_pixels : returns between two surfaces, where nothing else was seen. Turn off to keep
-        single twigs and wires.
-    moving : what beams went through at other times: people, vehicles. Turn off where only what
-        stood still can have been seen, as in a mine without people.
-    """
+    """What is left out of the map."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    mixed_pixels: bool = True
-    moving: bool = True
+    mixed_pixels: bool = Field(
+        default=True,
+        description="leave out returns between two surfaces, where nothing else was seen; turn off to "
+        "keep single twigs and wires",
+    )
+    moving: bool = Field(
+        default=True,
+        description="leave out what beams went through at other times: people, vehicles; turn off "
+        "where nothing can have moved, as in a mine without people",
+    )
 
 
 def clean(

@@ -64,6 +64,9 @@ def read_parts(
         If the file is of another kind, damaged or truncated, which may show at its end only.
     """
     path = Path(path)
+    if not path.exists():
+        msg = f"{path}: no such file or folder"
+        raise InputError(msg)
     reader = _READERS.get(path.suffix.lower())
     if reader is None:
         msg = f"{path}: maps are read from {', '.join(_READERS)} files; convert it first"

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, get_args
 
 import numpy as np
-import yaml
 from pydantic import (
     BaseModel,
     ConfigDict,
@@ -25,8 +24,9 @@ from pydantic import (
 from bentwing.base.arguments import instance
 from bentwing.base.errors import PayloadError
 from bentwing.base.mount import Pose
+from bentwing.base.validation import describe
+from bentwing.base.yaml_files import read_yaml
 from bentwing.recording.lidar_kinds import KIND_DEFAULTS, LidarKind, VelodyneModel
-from bentwing.recording.payload_errors import describe
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -253,7 +253,8 @@ class Payload(_Section):
         PayloadError
             The file cannot be read or is invalid; all problems in one sentence.
         """
-        data = _read_yaml(Path(path))
+        advice = "give the payload.yaml that describes the sensor head"
+        data = read_yaml(Path(path), advice, PayloadError)
         if not isinstance(data, dict):
             msg = f"{path}: expected a mapping of sections (lidar, imu, T_imu_lidar, …), found {type(data).__name__}"
             raise PayloadError(msg)
@@ -297,18 +298,3 @@ def as_payload(value: PayloadLike) -> Payload:
     return instance(
         "payload", value, Payload, "give the path of a payload.yaml, a Payload, or None"
     )
-
-
-def _read_yaml(path: Path) -> object:
-    try:
-        return yaml.safe_load(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        msg = f"{path}: no such file; give the payload.yaml that describes the sensor head"
-        raise PayloadError(msg) from None
-    except (OSError, UnicodeDecodeError) as error:
-        msg = f"{path}: cannot be read ({error}); give a YAML text file"
-        raise PayloadError(msg) from None
-    except yaml.YAMLError as error:
-        place = " ".join(str(error).split())
-        msg = f"{path}: not valid YAML ({place})"
-        raise PayloadError(msg) from None

@@ -25,10 +25,12 @@ if TYPE_CHECKING:
 
     from bentwing.closing.georeference import GeoreferenceSettings
     from bentwing.closing.localize import PriorMap
+    from bentwing.map import MapFormat
     from bentwing.map.clean import CleanSettings
+    from bentwing.odometry import EstimatorName, EstimatorSettings
     from bentwing.recording import Payload
     from bentwing.run.found import Found
-    from bentwing.run.settings import EstimatorName, EstimatorSettings, MapFormat, RunSettings
+    from bentwing.run.settings import RunSettings
 
 
 def map_recording(

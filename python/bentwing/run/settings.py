@@ -4,27 +4,31 @@
 from __future__ import annotations
 
 from pathlib import Path  # noqa: TC003 - pydantic reads the annotations
-from typing import Any, Literal, TypeVar
+from typing import Annotated, Any, Literal, TypeVar
 
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
-from bentwing.base.errors import UsageError
+from bentwing.base.errors import BentwingError, UsageError
 from bentwing.base.plain import plain
+from bentwing.base.units import Metres, Unit
+from bentwing.base.validation import describe
 from bentwing.closing.georeference.settings import GeoreferenceSettings
 from bentwing.closing.global_registration.settings import GlobalSettings
 from bentwing.map.clean import CleanSettings
-from bentwing.map.writer import require_format
-from bentwing.odometry import ESTIMATORS, require_estimator
-from bentwing.odometry.continuous.settings import ContinuousSettings
-from bentwing.odometry.kalman.settings import KalmanSettings
-from bentwing.odometry.ndt.settings import NdtSettings
+from bentwing.map.writer import MapFormat, require_format
+from bentwing.odometry import (
+    ESTIMATORS,
+    ContinuousSettings,
+    EstimatorName,
+    EstimatorSettings,
+    KalmanSettings,
+    NdtSettings,
+    require_estimator,
+)
 from bentwing.recording import Payload
 
-EstimatorName = Literal["continuous", "kalman", "ndt"]
-MapFormat = Literal["laz", "las", "ply", "pcd", "e57"]
 _Model = TypeVar("_Model", bound=BaseModel)
-EstimatorSettings = ContinuousSettings | KalmanSettings | NdtSettings
 
 
 class MapSettings(BaseModel):
@@ -33,11 +37,11 @@ class MapSettings(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     map_format: MapFormat = Field("laz", description="file format of the map")
-    map_spacing: float = Field(
-        0.0, ge=0, description="edge of the voxels that keep one point each, m; 0 keeps all points"
+    map_spacing: Metres = Field(
+        0.0, ge=0, description="edge of the voxels that keep one point each; 0 keeps all points"
     )
     cleaning: CleanSettings = Field(CleanSettings(), description="what the map leaves out")
-    threads: int | None = Field(None, ge=1, description="default: all cores")
+    threads: int | None = Field(None, ge=1, description="number of threads; default: all cores")
 
     @field_validator("map_format", mode="before")
     @classmethod
@@ -52,18 +56,16 @@ class MapSettings(BaseModel):
 
 
 class MergeSettings(MapSettings):
-    """What decides a merged map.
+    """What decides a merged map."""
 
-    Attributes
-    ----------
-    runs : folders of the runs
-    flights : files of each flight by its name, where the flights are mapped first
-    loop_closure : how the runs are registered with each other
-    """
-
-    runs: tuple[Path, ...] = ()
-    flights: dict[str, tuple[Path, ...]] = Field(default_factory=dict)
-    loop_closure: GlobalSettings = GlobalSettings()
+    runs: tuple[Path, ...] = Field((), description="folders of the runs")
+    flights: dict[str, tuple[Path, ...]] = Field(
+        default_factory=dict,
+        description="files of each flight by its name, where the flights are mapped first",
+    )
+    loop_closure: GlobalSettings = Field(
+        GlobalSettings(), description="how the runs are registered with each other"
+    )
 
 
 class RunSettings(MapSettings):
@@ -80,12 +82,18 @@ class RunSettings(MapSettings):
         GlobalSettings(), description="how loops are closed; false leaves the trajectory open-loop"
     )
     prior_map: Path | None = Field(None, description="map in which the recording is localized")
-    start: float | None = Field(None, ge=0, description="of the part to use, s")
-    duration: float | None = Field(None, ge=0, description="of the part to use, s")
-    continuous: ContinuousSettings = ContinuousSettings()
-    kalman: KalmanSettings = KalmanSettings()
-    ndt: NdtSettings = NdtSettings()
-    payload: Payload = Field(default_factory=Payload.default)
+    start: Annotated[float | None, Unit("s")] = Field(
+        None, ge=0, description="time to skip at the start of the recording"
+    )
+    duration: Annotated[float | None, Unit("s")] = Field(
+        None, ge=0, description="length of the part to use; default: all of the recording"
+    )
+    continuous: ContinuousSettings = Field(
+        ContinuousSettings(), description="settings of the continuous estimator"
+    )
+    kalman: KalmanSettings = Field(KalmanSettings(), description="settings of the Kalman filter")
+    ndt: NdtSettings = Field(NdtSettings(), description="settings of the NDT odometry")
+    payload: Payload = Field(default_factory=Payload.default, description="the sensor head")
 
     @field_validator("estimator", mode="before")
     @classmethod
@@ -115,8 +123,12 @@ class RunSettings(MapSettings):
         return {k: v for k, v in described.items() if k == self.estimator or k not in ESTIMATORS}
 
     def to_yaml(self) -> str:
-        """Return the settings as text that `from_yaml` reads."""
-        return yaml.safe_dump(self.to_json(), sort_keys=False)
+        """Return the settings as YAML that says the same when it is read again."""
+        described = self.to_json()
+        if self.payload.imu is not None and not self.payload.describes_imu:
+            # Its mention would say that the head carries one.
+            del described["payload"]["imu"]
+        return yaml.safe_dump(described, sort_keys=False, allow_unicode=True)
 
 
 def as_run_settings(
@@ -149,20 +161,22 @@ def run_settings(**values: Any) -> RunSettings:  # noqa: ANN401 - the model chec
     UsageError
         If a value is not possible; the sentence names it.
     """
-    return _validated(RunSettings, values)
+    return validated(RunSettings, values)
 
 
 def merge_settings(**values: Any) -> MergeSettings:  # noqa: ANN401 - the model checks them
     """Return the settings of a merging; raises as `run_settings` does."""
-    return _validated(MergeSettings, values)
+    return validated(MergeSettings, values)
 
 
-def _validated(model: type[_Model], values: dict[str, Any]) -> _Model:
+def validated(
+    model: type[_Model],
+    values: dict[str, Any],
+    source: Path | str = "settings",
+    kind: type[BentwingError] = UsageError,
+) -> _Model:
+    """Return the settings in `values`, or raise an error whose sentence names source and setting."""
     try:
         return model.model_validate(values)
     except ValidationError as error:
-        found = [
-            f"{'.'.join(map(str, e['loc']))}: {e['msg']}, found {e['input']!r}"
-            for e in error.errors(include_url=False)
-        ]
-        raise UsageError("; ".join(found)) from None
+        raise kind(describe(error, model, source)) from None

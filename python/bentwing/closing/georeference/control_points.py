@@ -79,7 +79,10 @@ def read_control_points(path: Path) -> list[ControlPoint]:
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
             lines = [line for line in file if line.strip() and not line.startswith("#")]
-    except (OSError, UnicodeDecodeError) as error:
+    except OSError as error:
+        msg = f"{path}: cannot be read ({error.strerror})"
+        raise InputError(msg) from None
+    except UnicodeDecodeError as error:
         msg = f"{path}: not readable as control points ({error})"
         raise InputError(msg) from error
     reader = csv.DictReader(lines, skipinitialspace=True)

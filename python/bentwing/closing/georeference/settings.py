@@ -12,19 +12,21 @@ GeoreferenceMode: TypeAlias = Literal["rigid", "constraints", "off"]
 
 
 class GeoreferenceSettings(BaseModel):
-    """How GNSS fixes and control points are used.
-
-    Attributes
-    ----------
-    mode : `rigid` turns the map about the vertical and shifts it, and leaves its shape alone;
-        `constraints` also bends the trajectory towards the fixes and control points, as far as it
-        may have drifted: choose it for long flights with good fixes; `off` ignores them
-    epsg : projected system of the map; default: the UTM zone of the fixes
-    control_points : CSV file of surveyed points, see `read_control_points`
-    """
+    """How GNSS fixes and control points are used."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    mode: GeoreferenceMode = "rigid"
-    epsg: int | None = Field(default=None, gt=0)
-    control_points: Path | None = None
+    mode: GeoreferenceMode = Field(
+        "rigid",
+        description="`rigid` turns the map about the vertical and shifts it, and leaves its shape alone; "
+        "`constraints` also bends the trajectory towards the fixes and control points, as far as it may "
+        "have drifted: choose it for long flights with good fixes; `off` ignores them",
+    )
+    epsg: int | None = Field(
+        default=None,
+        gt=0,
+        description="projected system of the map; default: the UTM zone of the fixes",
+    )
+    control_points: Path | None = Field(
+        default=None, description="CSV file of surveyed points, see `read_control_points`"
+    )

@@ -3,8 +3,11 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
+from bentwing.base.units import Metres, Radians, Seconds, Unit
 from bentwing.odometry.continuous.slow_states import SLICES
 
 
@@ -15,60 +18,100 @@ class _Section(BaseModel):
 class SurfelSettings(_Section):
     """What makes a surfel (Kaul 2015, section 2.1)."""
 
-    voxel_size: float = Field(0.4, gt=0, description="finest level, m; each further level doubles")
-    n_levels: int = Field(4, ge=1, le=8)
-    max_gap: float = Field(0.08, gt=0, description="a longer pause splits a cell, s")
-    max_span: float = Field(0.3, gt=0, description="longest time in a surfel, s")
-    min_points: int = Field(6, ge=4)
-    min_planarity: float = Field(0.3, ge=0, le=1, description="2 (l2 - l1) / (l1 + l2 + l3)")
-    min_width_ratio: float = Field(0.03, ge=0, le=1, description="l2 / l3")
+    voxel_size: Metres = Field(
+        0.4, gt=0, description="edge of the finest voxels; each further level doubles it"
+    )
+    n_levels: int = Field(4, ge=1, le=8, description="number of voxel levels")
+    max_gap: Seconds = Field(
+        0.08, gt=0, description="pause beyond which a voxel's points are split"
+    )
+    max_span: Seconds = Field(0.3, gt=0, description="longest time in a surfel")
+    min_points: int = Field(6, ge=4, description="fewest points of a surfel")
+    min_planarity: float = Field(
+        0.3, ge=0, le=1, description="least 2 (λ2 - λ1) / (λ1 + λ2 + λ3) of a surfel"
+    )
+    min_width_ratio: float = Field(0.03, ge=0, le=1, description="least λ2 / λ3 of a surfel")
     min_width: float = Field(
-        0.05, ge=0, description="sqrt(l2) in voxels; rejects single scan lines"
+        0.05, ge=0, description="least √λ2 of a surfel, in voxels; rejects single scan lines"
     )
     min_incidence_cosine: float = Field(
-        0.1, ge=0, lt=1, description="between normal and ray; rejects the plane of the scan itself"
+        0.1,
+        ge=0,
+        lt=1,
+        description="least cosine between normal and ray; rejects the plane of the scan itself",
     )
-    max_rate: float = Field(1500.0, gt=0, description="most surfels per second of data")
+    max_rate: Annotated[float, Unit("1/s")] = Field(
+        1500.0, gt=0, description="most surfels per second of data"
+    )
 
 
 class RegistrationSettings(_Section):
     """How a window is registered (Kaul 2015, section 2.1)."""
 
-    knot_interval: float = Field(0.2, gt=0, description="of the correction spline, s")
-    n_neighbors: int = Field(2, ge=1)
-    max_match_distance: float = Field(1.0, gt=0, le=1, description="in feature space")
-    min_match_gap: float = Field(0.3, ge=0, description="least difference in time of matches, s")
-    first_cauchy_scale: float = Field(3.0, gt=0, description="first outer iteration, sigmas")
-    cauchy_scale: float = Field(1.0, gt=0, description="later outer iterations, sigmas")
-    max_outer: int = Field(20, ge=1, description="a window that follows a gap needs many")
-    n_inner: int = Field(1, ge=1)
-    min_translation: float = Field(2e-3, gt=0, description="smaller steps end the iterations, m")
-    min_rotation: float = Field(2e-4, gt=0, description="smaller steps end the iterations, rad")
-    velocity_sigma: float = Field(0.5, gt=0, description="deviation from the prior, m/s")
-    rate_sigma: float = Field(0.5, gt=0, description="deviation from the prior, rad/s")
-    motion_accel_density: float = Field(1.5, gt=0, description="without IMU, m/s²/√Hz")
-    motion_angular_density: float = Field(1.0, gt=0, description="without IMU, rad/s²/√Hz")
+    knot_interval: Seconds = Field(
+        0.2, gt=0, description="time between knots of the correction spline"
+    )
+    n_neighbors: int = Field(
+        2, ge=1, description="nearest neighbours that a surfel is matched with"
+    )
+    max_match_distance: float = Field(
+        1.0, gt=0, le=1, description="largest distance of a match in feature space"
+    )
+    min_match_gap: Seconds = Field(0.3, ge=0, description="least difference in time of a match")
+    first_cauchy_scale: float = Field(
+        3.0,
+        gt=0,
+        description="scale of the robust loss in the first outer iteration, in standard deviations",
+    )
+    cauchy_scale: float = Field(1.0, gt=0, description="the same in later outer iterations")
+    max_outer: int = Field(
+        20, ge=1, description="most outer iterations; a window that follows a gap needs many"
+    )
+    n_inner: int = Field(1, ge=1, description="solutions per outer iteration")
+    min_translation: Metres = Field(
+        2e-3, gt=0, description="smaller steps of the position end the iterations"
+    )
+    min_rotation: Radians = Field(
+        2e-4, gt=0, description="smaller steps of the rotation end the iterations"
+    )
+    velocity_sigma: Annotated[float, Unit("m/s")] = Field(
+        0.5, gt=0, description="expected deviation of the velocity from the prior"
+    )
+    rate_sigma: Annotated[float, Unit("rad/s")] = Field(
+        0.5, gt=0, description="expected deviation of the angular rate from the prior"
+    )
+    motion_accel_density: Annotated[float, Unit("m/s²/√Hz")] = Field(
+        1.5, gt=0, description="how hard the carrier accelerates, where no IMU says it"
+    )
+    motion_angular_density: Annotated[float, Unit("rad/s²/√Hz")] = Field(
+        1.0, gt=0, description="the same of rotation"
+    )
 
 
 class ContinuousSettings(_Section):
     """The sliding window of the continuous estimator."""
 
-    window: float = Field(5.0, gt=0, description="length, s")
-    shift: float = Field(1.5, gt=0, description="new data per step, s")
-    window_without_imu: float = Field(2.0, gt=0, description="length without an IMU, s")
-    shift_without_imu: float = Field(
+    window: Seconds = Field(5.0, gt=0, description="length of the sliding window")
+    shift: Seconds = Field(1.5, gt=0, description="new data per step of the window")
+    window_without_imu: Seconds = Field(
+        2.0, gt=0, description="length of the window without an IMU"
+    )
+    shift_without_imu: Seconds = Field(
         0.2,
         gt=0,
-        description="new data per step without an IMU, s: how long velocities are extrapolated",
+        description="new data per step without an IMU: how long velocities are extrapolated",
     )
-    view_length: float = Field(1.5, gt=0, description="of a fixed view, s")
-    view_distance: float = Field(1.5, gt=0, description="motion that renews the fixed views, m")
-    n_views: int = Field(5, ge=0, description="fixed views in a window")
+    view_length: Seconds = Field(1.5, gt=0, description="length of a fixed view")
+    view_distance: Metres = Field(1.5, gt=0, description="motion that renews the fixed views")
+    n_views: int = Field(5, ge=0, description="number of fixed views in a window")
     frozen: tuple[str, ...] = Field(
-        (), description="slow states that are not estimated: latency, extrinsic_rotation, …"
+        (),
+        description="slow states that are not estimated, such as `latency`, `extrinsic_rotation`",
     )
-    surfels: SurfelSettings = SurfelSettings()
-    registration: RegistrationSettings = RegistrationSettings()
+    surfels: SurfelSettings = Field(SurfelSettings(), description="what makes a surfel")
+    registration: RegistrationSettings = Field(
+        RegistrationSettings(), description="how a window is registered"
+    )
 
     @field_validator("frozen")
     @classmethod

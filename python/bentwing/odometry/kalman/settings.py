@@ -3,9 +3,11 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
+
+from bentwing.base.units import Metres, Seconds, Unit
 
 
 class KalmanSettings(BaseModel):
@@ -13,25 +15,29 @@ class KalmanSettings(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
-    scan: float = Field(0.1, ge=0.02, le=1.0, description="lidar data per update, s")
-    voxel_size: float = Field(
-        0.5, gt=0.05, le=10.0, description="finest level of the map, m; each further level doubles"
+    scan: Seconds = Field(0.1, ge=0.02, le=1.0, description="length of the lidar data per update")
+    voxel_size: Metres = Field(
+        0.5,
+        gt=0.05,
+        le=10.0,
+        description="edge of the map's finest voxels; each further level doubles it",
     )
-    n_levels: int = Field(3, ge=1, le=6)
-    max_features: int = Field(1500, ge=50, description="planar features of an update, at most")
-    max_iterations: int = Field(4, ge=1, le=20)
-    edges: bool = Field(default=True, description="whether depth edges take part beside planes")
+    n_levels: int = Field(3, ge=1, le=6, description="number of voxel levels")
+    max_features: int = Field(1500, ge=50, description="most planar features of an update")
+    max_iterations: int = Field(4, ge=1, le=20, description="most iterations of an update")
+    edges: bool = Field(default=True, description="whether to use depth edges beside planes")
     rotation: Literal["encoder", "ignored"] = Field(
         "encoder",
-        description="`ignored` takes a turning lidar for a fixed one, as FAST-LIO would",
+        description="how a motor's rotation enters; `ignored` takes a turning lidar for a fixed one, "
+        "as FAST-LIO would",
     )
-    rehearsal: float = Field(
+    rehearsal: Seconds = Field(
         12.0,
         ge=0.0,
-        description="after so long begin again with what was learned of the mount, s; 0: never",
+        description="time after which the filter begins again with the mount it has learned; 0: never",
     )
-    odometry_rate: float = Field(
-        50.0, ge=10.0, le=1000.0, description="of the predicted poses between updates, Hz"
+    odometry_rate: Annotated[float, Unit("Hz")] = Field(
+        50.0, ge=10.0, le=1000.0, description="rate of the predicted poses between updates"
     )
     smoothing: float = Field(
         0.62, gt=0.0, le=1.0, description="low-pass factor of the smoothed odometry; 1: none"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""Turn the validator's findings about a payload file into one clear sentence."""
+"""Turns what pydantic finds wrong with values into one clear sentence."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
 
 
-def describe(error: ValidationError, model: type[BaseModel], path: Path | str) -> str:
-    """Return one sentence that names every problem with its file and key path."""
+def describe(error: ValidationError, model: type[BaseModel], source: Path | str) -> str:
+    """Return one sentence that names every problem with its source and key path."""
     problems = "; ".join(_problem(item, model) for item in error.errors(include_url=False))
-    return f"{path}: {problems}"
+    return f"{source}: {problems}"
 
 
 def _problem(item: ErrorDetails, model: type[BaseModel]) -> str:
     location = item["loc"]
     if item["type"] == "extra_forbidden":
         return _unknown_key(location, model)
-    where = _key_path(location)
+    where = f"{_key_path(location)}: " if location else ""
     if item["type"] == "missing":
-        return f"{where}: required, but not given"
+        return f"{where}required, but not given"
     message = item["msg"].removeprefix("Value error, ")
     message = message[:1].lower() + message[1:]
     # Problems raised by our own validators carry their numbers already.
     found = "" if item["type"] == "value_error" else f", found {_short(item['input'])}"
-    return f"{where}: {message}{found}"
+    return f"{where}{message}{found}"
 
 
 def _unknown_key(location: Sequence[int | str], model: type[BaseModel]) -> str:
@@ -72,7 +72,7 @@ def _key_path(location: Sequence[int | str]) -> str:
     text = ""
     for key in location:
         text += f"[{key}]" if isinstance(key, int) else f".{key}" if text else str(key)
-    return text or "payload"
+    return text
 
 
 def _short(value: object) -> str:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""A calibration as a table and sentences."""
+"""The page that `bentwing calibrate` prints."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ ROWS = {
 
 
 def page(found: Calibrated) -> Iterator[RenderableType]:
-    """Yield what is shown of a calibration."""
+    """Yield the parts of the page, top to bottom."""
     table = Table("", "correction", "standard deviation", "")
     changes = _changes(found)
     for name, (what, unit, factor) in ROWS.items():

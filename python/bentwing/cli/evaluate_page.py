@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""The tables that `bentwing evaluate` prints."""
+"""The page that `bentwing evaluate` prints."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Row = tuple[str, str, str]
 _BARELY_SEEN = 0.3  # m; a lever arm of a greater standard deviation was not observed
 
 
-def tables(result: Evaluation) -> Iterator[RenderableType]:
+def page(result: Evaluation) -> Iterator[RenderableType]:
     """Yield the parts of the page, top to bottom."""
     if result.trajectory is not None:
         yield _table("trajectory against the reference", _trajectory(result.trajectory))

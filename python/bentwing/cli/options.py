@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""The options that several commands have: each with one name, one short form and one sentence."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from bentwing.cli.choices import EstimatorName, GeoreferenceMode, MapFormat
+
+# The groups of a help page, in its order.
+INPUT = "Input"
+RESULT = "Result"
+ESTIMATION = "Estimation"
+MAP = "Map"
+EARTH = "Coordinates"
+RUNNING = "Running"
+GROUPS = (INPUT, RESULT, ESTIMATION, MAP, EARTH, RUNNING)
+
+
+def option(group: str, *names: str, **details: Any) -> Any:  # noqa: ANN401 - typer's own
+    """Return an option in a group of the help page."""
+    return typer.Option(*names, rich_help_panel=group, **details)
+
+
+def out(*aliases: str, **details: Any) -> Any:  # noqa: ANN401 - typer's own
+    """Return the option that names the folder of the results."""
+    return option(
+        RESULT, "--out", "-o", *aliases, metavar="FOLDER", help="Write into this folder.", **details
+    )
+
+
+def payload(**details: Any) -> Any:  # noqa: ANN401 - typer's own
+    """Return the option that names the description of the sensor head."""
+    help_line = "Description of the sensor head, payload.yaml."
+    return option(INPUT, "--payload", "-p", metavar="FILE", help=help_line, **details)
+
+
+def cleaning(*, keep_mixed: bool, keep_moving: bool) -> dict[str, bool]:
+    """Return what the map keeps, where that differs from the settings."""
+    kept = {"mixed_pixels": keep_mixed, "moving": keep_moving}
+    return {name: False for name, is_kept in kept.items() if is_kept}
+
+
+Recording = Annotated[
+    list[Path],
+    typer.Argument(
+        metavar="RECORDING",
+        help="ROS 1 .bag, ROS 2 bag folder, .db3, .mcap or .pcap; several parts of one recording "
+        "one after the other.",
+        rich_help_panel=INPUT,
+    ),
+]
+Payload = Annotated[Path | None, payload()]
+Start = Annotated[
+    float | None, option(INPUT, metavar="SECONDS", min=0, help="Skip so much at the start.")
+]
+Duration = Annotated[
+    float | None, option(INPUT, metavar="SECONDS", min=0, help="Use so much of the recording.")
+]
+
+Out = Annotated[Path, out()]
+Json = Annotated[bool, option(RESULT, "--json", help="Print one JSON object instead.")]
+
+Estimator = Annotated[
+    EstimatorName | None,
+    option(
+        ESTIMATION,
+        show_default="continuous",
+        help="Method of the odometry: kalman for 3D lidars, faster; ndt for 3D lidars without an IMU.",
+    ),
+]
+Settings = Annotated[
+    Path | None,
+    option(
+        ESTIMATION,
+        metavar="FILE",
+        help="Settings as YAML, all or some of those that --print-settings prints.",
+    ),
+]
+Set = Annotated[
+    list[str],
+    option(
+        ESTIMATION,
+        "--set",
+        metavar="NAME=VALUE",
+        show_default=False,
+        help="Change one setting, such as window=4 of the estimator; repeatable.",
+    ),
+]
+
+Format = Annotated[
+    MapFormat | None,
+    option(MAP, "--map-format", show_default="laz", help="Format of the map."),
+]
+Spacing = Annotated[
+    float | None,
+    option(
+        MAP,
+        "--map-spacing",
+        metavar="METRES",
+        min=0,
+        show_default="0",
+        help="Keep one point per voxel of this edge; 0 keeps all.",
+    ),
+]
+KeepMoving = Annotated[
+    bool,
+    option(
+        MAP,
+        "--keep-moving",
+        help="Keep points that beams went through at other times or in other runs.",
+    ),
+]
+KeepMixed = Annotated[bool, option(MAP, "--keep-mixed", help="Keep returns between two surfaces.")]
+
+Georeference = Annotated[
+    GeoreferenceMode | None,
+    option(
+        EARTH,
+        "--georeference",
+        show_default="rigid",
+        help="Use of GNSS fixes and control points; constraints may bend the map.",
+    ),
+]
+Epsg = Annotated[
+    int | None,
+    option(
+        EARTH,
+        metavar="CODE",
+        min=1,
+        show_default="UTM zone",
+        help="Projected system of the map.",
+    ),
+]
+ControlPoints = Annotated[
+    Path | None,
+    option(EARTH, metavar="FILE", help="CSV of surveyed points: id,x,y,z,radius[,use]."),
+]
+
+Threads = Annotated[
+    int | None,
+    option(
+        RUNNING,
+        "--threads",
+        "-j",
+        metavar="N",
+        min=1,
+        show_default="all cores",
+        help="Use so many threads; the result does not depend on it.",
+    ),
+]
+Resume = Annotated[
+    bool, option(RUNNING, "--resume", help="Continue the run in FOLDER that was killed.")
+]
+Quiet = Annotated[bool, option(RUNNING, "--quiet", "-q", help="Print nothing but errors.")]

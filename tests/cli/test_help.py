@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""Help pages and completion: what a user sees before anything is read."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import subprocess
+import sys
+from typing import get_args
+
+import pytest
+
+from bentwing.cli import choices
+from bentwing.cli.commands import COMMANDS, load
+from bentwing.cli.main import run_command
+from bentwing.closing import GeoreferenceMode
+from bentwing.map import MapFormat
+from bentwing.odometry import EstimatorName
+from bentwing.reproduce import PARTS
+from bentwing.simulate import events, gnss, scenario
+
+# typer itself takes pydantic, as soon as a command has options.
+HEAVY = ("numpy", "rich", "laspy", "rosbags", "scipy", "bentwing.run.pipeline")
+# The same short form stands for the same option in every command.
+SHORT = {"-o": "--out", "-p": "--payload", "-q": "--quiet", "-j": "--threads"}
+
+
+def run_python(script, **environment):
+    done = subprocess.run(
+        [sys.executable, "-c", script],
+        capture_output=True,
+        text=True,
+        check=True,
+        env=os.environ | environment,
+    )
+    return done.stdout
+
+
+def completed(*words):
+    """What the shell offers for the last word."""
+    return run_python(
+        "from bentwing.cli.main import run; run()",
+        _BENTWING_COMPLETE="complete_bash",
+        COMP_WORDS=shlex.join(["bentwing", *words]),
+        COMP_CWORD=str(len(words)),
+    ).split()
+
+
+@pytest.fixture
+def help_of(capsys):
+    def page(*command, option="--help"):
+        assert run_command([*command, option]) == 0
+        return capsys.readouterr().out
+
+    return page
+
+
+def test_the_list_of_commands_says_what_each_is_for(help_of):
+    page = " ".join(help_of().split())
+    for name, line in COMMANDS.items():
+        assert f"{name} {line}" in page
+    assert "Exit codes" in page
+
+
+def test_a_call_without_arguments_shows_the_help_and_is_wrong(capsys):
+    assert run_command([]) == 2
+    assert "Commands:" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("name", [None, *COMMANDS])
+def test_a_help_page_loads_nothing_heavy(name):
+    command = ["--help"] if name is None else [name, "--help"]
+    shown = run_python(
+        f"import sys; from bentwing.cli.main import run_command; run_command({command}); "
+        f"print([m for m in {HEAVY} if m in sys.modules])"
+    )
+    assert shown.splitlines()[-1] == "[]"
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_a_help_page_has_a_sentence_examples_and_exit_codes(help_of, name):
+    page = help_of(name)
+    usage, _, sentence = page.split("\n")[:3]
+    assert usage.startswith(f"Usage: bentwing {name} ")
+    assert sentence.startswith("  ")
+    assert f"Examples:\n  bentwing {name} " in page
+    for code in (0, 2, 3, 4, 130):
+        assert f"\n  {code} " in page
+    assert page == help_of(name, option="-h")
+    assert max(map(len, page.splitlines())) <= 110
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_option_has_a_sentence_and_a_group(name):
+    for parameter in load(name).params:
+        assert parameter.help.endswith("."), parameter.name
+        assert parameter.rich_help_panel, parameter.name
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_an_option_has_the_same_short_form_in_every_command(name):
+    for parameter in load(name).params:
+        if parameter.param_type_name == "option":
+            names = set(parameter.opts)
+            for short, long in SHORT.items():
+                assert (short in names) == (long in names), parameter.name
+
+
+def test_required_options_are_marked(help_of):
+    page = " ".join(help_of("map").split())
+    assert "-o, --out FOLDER Write into this folder. [required]" in page
+    assert "one after the other. [required]" in page
+
+
+@pytest.mark.parametrize(
+    ("command", "line"),
+    [
+        (name, line)
+        for name in COMMANDS
+        for line in load(name).epilog.split("\n\n")[0].splitlines()[2:]
+    ],
+)
+def test_an_example_of_a_help_page_can_be_typed(command, line):
+    program, name, *arguments = shlex.split(line.partition(" > ")[0])
+    assert (program, name) == ("bentwing", command)
+    with load(name).make_context(name, arguments) as context:
+        assert context.params
+
+
+def test_the_choices_of_options_are_those_there_are():
+    assert choices.EstimatorName == EstimatorName
+    assert choices.MapFormat == MapFormat
+    assert choices.GeoreferenceMode == GeoreferenceMode
+    assert get_args(choices.PaperName) == tuple(PARTS)
+    assert {one.value for one in choices.PartName} == {name for p in PARTS.values() for name in p}
+    for name in ("SceneName", "HeadName", "SpinName", "FlightName"):
+        assert getattr(choices, name) == getattr(scenario, name)
+    assert choices.RecordingFormat == scenario.Format
+    assert choices.ReceiverName == gnss.ReceiverName
+    assert tuple(one.value for one in choices.EventName) == get_args(events.EventName)
+
+
+@pytest.mark.parametrize(
+    ("words", "offered"),
+    [
+        (["lo"], {"localize"}),
+        (["map", "--pa"], {"--payload"}),
+        (["map", "--estimator", ""], {"continuous", "kalman", "ndt"}),
+        (["simulate", "court"], {"courtyard"}),
+        (["simulate", "office", "--event", "spin"], {"spin-stall"}),
+        (["--ins"], {"--install-completion"}),
+    ],
+)
+def test_the_shell_completes_commands_options_and_choices(words, offered):
+    assert set(completed(*words)) == offered

@@ -52,11 +52,17 @@ def create(
     TypeError
         If payload or settings are of another type.
     """
-    require_estimator(name)
-    engine, model = ESTIMATORS[name]
-    if settings is not None:
-        instance("settings", settings, model, f"the estimator {name!r} has settings of its own")
+    require_settings(name, settings)
+    engine, _ = ESTIMATORS[name]
     return engine(as_payload(payload), settings, threads)
+
+
+def require_settings(name: EstimatorName, settings: EstimatorSettings | None) -> None:
+    """Refuse settings that are not those of the estimator; None stands for its defaults."""
+    require_estimator(name)
+    if settings is not None:
+        _, model = ESTIMATORS[name]
+        instance("settings", settings, model, f"the estimator {name!r} has settings of its own")
 
 
 def require_estimator(name: str) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bentwing import odometry
+from bentwing.base.arguments import instance
 from bentwing.base.progress import Progress
 from bentwing.closing.localize import read_prior_map
 from bentwing.recording import Recording
@@ -28,14 +29,14 @@ if TYPE_CHECKING:
     from bentwing.map import MapFormat
     from bentwing.map.clean import CleanSettings
     from bentwing.odometry import EstimatorName, EstimatorSettings
-    from bentwing.recording import Payload
+    from bentwing.recording.payload import PayloadLike
     from bentwing.run.found import Found
     from bentwing.run.settings import RunSettings
 
 
 def map_recording(
     paths: Path | str | Sequence[Path | str],
-    payload: Payload | Path | str | None,
+    payload: PayloadLike,
     out: Path | str,
     *,
     estimator: EstimatorName = "continuous",
@@ -120,6 +121,8 @@ def run_recording(
     engine = odometry.create(
         settings.estimator, settings.payload, settings.of_estimator, settings.threads
     )
+    if progress is not None:
+        instance("progress", progress, Progress, "give a Progress, or None to say nothing")
     with (
         Recording(paths, settings.payload) as recording,
         RunFolder(Path(out), settings.to_json()) as folder,

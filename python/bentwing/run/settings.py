@@ -26,7 +26,8 @@ from bentwing.odometry import (
     NdtSettings,
     require_estimator,
 )
-from bentwing.recording import Payload
+from bentwing.odometry.registry import require_settings
+from bentwing.recording.payload import Payload, PayloadLike, as_payload
 
 _Model = TypeVar("_Model", bound=BaseModel)
 
@@ -133,24 +134,17 @@ class RunSettings(MapSettings):
 
 def as_run_settings(
     *,
-    estimator: str,
-    payload: Payload | Path | str | None,
+    estimator: EstimatorName,
+    payload: PayloadLike,
     settings: EstimatorSettings | None,
     **values: Any,  # noqa: ANN401 - the model checks them
 ) -> RunSettings:
     """Return the settings of a run from the arguments of a call, in which None is the default."""
-    require_estimator(estimator)
+    require_settings(estimator, settings)
     given = {name: value for name, value in values.items() if value is not None}
     if settings is not None:
         given[estimator] = settings
-    return run_settings(estimator=estimator, payload=load_payload(payload), **given)
-
-
-def load_payload(payload: Payload | Path | str | None) -> Payload:
-    """Return the sensor head, from its file if need be; None stands for the default."""
-    if isinstance(payload, Payload):
-        return payload
-    return Payload.default() if payload is None else Payload.load(payload)
+    return run_settings(estimator=estimator, payload=as_payload(payload), **given)
 
 
 def run_settings(**values: Any) -> RunSettings:  # noqa: ANN401 - the model checks them

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
+import copy
 import json
+import pickle
 from collections import Counter
 from pathlib import Path
 
@@ -179,6 +181,28 @@ def test_a_run_that_has_failed_is_not_read_as_a_run(tmp_path, recording, monkeyp
         pipeline.map_recording(recording, PAYLOAD, tmp_path / "out")
     with pytest.raises(UsageError, match="not complete"):
         Run.load(tmp_path / "out")
+
+
+@pytest.mark.parametrize(
+    ("wrong", "named"),
+    [
+        ({"settings": {}}, "settings"),
+        ({"progress": print}, "progress"),
+        ({"payload": 3}, "payload"),
+    ],
+)
+def test_arguments_of_a_wrong_type_are_refused_by_name(tmp_path, recording, wrong, named):
+    arguments = {"payload": PAYLOAD, **wrong}
+    with pytest.raises(TypeError, match=f"^{named}: expected"):
+        pipeline.map_recording(recording, out=tmp_path / "out", **arguments)
+    assert not (tmp_path / "out").exists()
+
+
+def test_runs_are_copied_and_pickled(tmp_path, recording):
+    run = pipeline.map_recording(recording, PAYLOAD, tmp_path / "out")
+    for again in (copy.deepcopy(run), pickle.loads(pickle.dumps(run))):
+        assert again.trajectory == run.trajectory
+        assert again.map_path == run.map_path
 
 
 def test_settings_are_written_once_and_read_back_the_same(recording):

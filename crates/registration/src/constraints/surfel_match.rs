@@ -6,8 +6,8 @@
     reason = "only what is inlined into a dispatched function uses the machine's instructions"
 )]
 
-use bentwing_surfels::sym3;
 use bentwing_trajectory::{Head, so3};
+use bentwing_voxels::sym3;
 use nalgebra::{Matrix3, Vector3};
 
 use crate::index;

@@ -3,7 +3,7 @@
 
 use rustc_hash::FxHashSet;
 
-use crate::voxel::key;
+use crate::VoxelKey;
 
 /// Indices of the first point in each voxel of edge `spacing`, m, and evenly chosen ones of these
 /// where they are more than `most`.
@@ -11,7 +11,7 @@ use crate::voxel::key;
 /// Near the sensor a scan is dense; unthinned, the nearest surface alone would decide its pose.
 pub fn thin(points: &[[f64; 3]], spacing: f64, most: usize) -> Vec<usize> {
     let mut seen = FxHashSet::with_capacity_and_hasher(points.len() / 2, rustc_hash::FxBuildHasher);
-    let first = |i: &usize| seen.insert(key(&points[*i], 1.0 / spacing));
+    let first = |i: &usize| seen.insert(VoxelKey::of(&points[*i], 1.0 / spacing));
     let kept: Vec<usize> = (0..points.len()).filter(first).collect();
     let n = kept.len().min(most);
     (0..n).map(|i| kept[i * kept.len() / n]).collect()

@@ -17,6 +17,7 @@ mod rows;
 mod settings;
 mod solve;
 mod step;
+mod uncertainty;
 mod window;
 
 pub use fixed_view::FixedView;
@@ -32,6 +33,7 @@ pub use rows::RowGroup;
 pub use settings::{ImuNoise, Settings};
 pub use solve::{Solution, SolveError, Solver, System};
 pub use step::StepSize;
+pub use uncertainty::Posterior;
 pub use window::{Initial, Problem, Registration, first_equations, register_window};
 
 /// A vector of all global states or their corrections.

@@ -69,6 +69,7 @@ impl Marginals {
     }
 }
 
+#[derive(Clone, Debug)]
 enum Factor {
     Dense(DenseLlt),
     Sparse(SparseLlt<usize, f64>),
@@ -92,6 +93,7 @@ pub struct Solver {
 }
 
 /// A factorized system.
+#[derive(Clone, Debug)]
 pub struct Factorized {
     factor: Factor,
     layout: Layout,
@@ -195,18 +197,25 @@ impl Factorized {
         Solution { knots, globals }
     }
 
-    /// Covariance of the control points `controls`, of which none is clamped.
-    pub fn covariance(&self, controls: Range<usize>) -> DMatrix<f64> {
-        let first = 6 * (controls.start - self.layout.n_clamped);
-        let n = 6 * controls.len();
-        let mut units = Mat::<f64>::zeros(self.layout.len(), n);
-        for i in 0..n {
-            units[(first + i, i)] = 1.0;
+    /// Joint covariance of the control points `controls`; `ties` are the responses of clamped ones.
+    pub fn covariance(&self, controls: Range<usize>, ties: &[PoseResponse]) -> DMatrix<f64> {
+        let mut rows = Mat::<f64>::zeros(self.layout.len(), 6 * controls.len());
+        for (i, control) in controls.enumerate() {
+            for part in 0..6 {
+                let column = rows.col_as_slice_mut(6 * i + part);
+                if let Some(first) = self.layout.knot(control) {
+                    column[first + part] = 1.0;
+                } else if let Some(tie) = ties.get(control) {
+                    let globals = &mut column[self.layout.n_knot_unknowns()..];
+                    for (entry, &g) in globals.iter_mut().zip(&self.layout.active) {
+                        *entry = tie[part][g];
+                    }
+                }
+            }
         }
-        let inverse = self.factor.solve(&units);
-        DMatrix::from_fn(n, n, |i, j| {
-            0.5 * (inverse[(first + i, j)] + inverse[(first + j, i)])
-        })
+        let joint = rows.transpose() * self.factor.solve(&rows);
+        let n = joint.nrows();
+        DMatrix::from_fn(n, n, |i, j| 0.5 * (joint[(i, j)] + joint[(j, i)]))
     }
 
     /// What the system says of the global states, and how the control points go with them.

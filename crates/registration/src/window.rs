@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use bentwing_surfels::SurfelSet;
 use bentwing_trajectory::{CorrectionSpline, Imu, Trajectory};
+use nalgebra::Matrix6;
 
 use crate::constraints::{imu, initial, motion, prior, velocity};
 use crate::matches::{self, MatchRows};
@@ -13,7 +14,8 @@ use crate::response::{self, PoseResponse};
 use crate::solve::{Factorized, Marginals, Solution, SolveError, Solver};
 use crate::step::{self, StepSize};
 use crate::{
-    FixedView, GlobalMatrix, GlobalPrior, GlobalVector, Globals, Health, NormalEquations, Settings,
+    FixedView, GlobalMatrix, GlobalPrior, GlobalVector, Globals, Health, NormalEquations,
+    Posterior, Settings,
 };
 
 /// How the start of the trajectory is held.
@@ -70,6 +72,16 @@ pub struct Registration {
     pub converged: bool,
     /// Samples of the trajectory without inertial data.
     pub n_blind: usize,
+    /// The last equations, if there was an iteration.
+    pub posterior: Option<Posterior>,
+}
+
+impl Registration {
+    /// Marginal covariance of the correction `[δr, δt]` of each sample; none without an iteration.
+    pub fn sample_covariances(&self) -> Vec<Matrix6<f64>> {
+        let posterior = self.posterior.as_ref();
+        posterior.map_or_else(Vec::new, |p| p.at_samples(&self.trajectory))
+    }
 }
 
 /// Corrects a trajectory and its calibration (Kaul 2015, section 2.1).
@@ -116,7 +128,7 @@ pub fn register_window(
         }
         n_outer += 1;
     }
-    Ok(state.finish(last, &ties, n_outer, step_size.converged(settings)))
+    Ok(state.finish(last, ties, n_outer, step_size.converged(settings)))
 }
 
 /// The normal equations of the first iteration, for those who study how to solve them.
@@ -197,18 +209,24 @@ impl State {
     fn finish(
         self,
         last: Option<(Factorized, Health, usize)>,
-        ties: &[PoseResponse],
+        ties: Vec<PoseResponse>,
         n_outer: usize,
         converged: bool,
     ) -> Registration {
-        let (marginals, health, n_surfels) = match last {
-            Some((f, health, n)) => (f.marginals(ties), health, n),
+        let (marginals, health, n_surfels, factorized) = match last {
+            Some((f, health, n)) => (f.marginals(&ties), health, n, Some(f)),
             None => (
                 Marginals::unknown(self.spline.n_controls()),
                 Health::default(),
                 0,
+                None,
             ),
         };
+        let posterior = factorized.map(|factorized| Posterior {
+            factorized,
+            ties,
+            spline: self.spline,
+        });
         Registration {
             responses: response::at_samples(&marginals.responses, &self.trajectory, &self.spline),
             trajectory: self.trajectory,
@@ -220,6 +238,7 @@ impl State {
             n_outer,
             converged,
             n_blind: self.n_blind,
+            posterior,
         }
     }
 }

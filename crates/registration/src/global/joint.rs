@@ -147,7 +147,7 @@ impl Joint {
         piece: usize,
         state: &PieceState<'_>,
     ) -> GlobalMatrix {
-        let all = factorized.covariance(self.stand_in(piece)..self.stand_in(piece + 1));
+        let all = factorized.covariance(self.stand_in(piece)..self.stand_in(piece + 1), &[]);
         let frozen = state.frozen();
         GlobalMatrix::from_fn(|r, c| {
             if frozen[r] || frozen[c] {

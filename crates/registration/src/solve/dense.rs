@@ -13,6 +13,7 @@ use super::{SolveError, singular};
 use crate::NormalEquations;
 
 /// The factor in the lower triangle; what is above the diagonal means nothing.
+#[derive(Clone, Debug)]
 pub(super) struct DenseLlt(Mat<f64>);
 
 impl DenseLlt {

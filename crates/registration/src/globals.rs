@@ -4,10 +4,12 @@
 use bentwing_trajectory::{Head, so3};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
-use crate::{GlobalMatrix, GlobalVector};
-
 /// Number of global states.
 pub const N_GLOBALS: usize = 20;
+/// A vector of all global states or their corrections.
+pub type GlobalVector = [f64; N_GLOBALS];
+/// A matrix over all global states.
+pub type GlobalMatrix = nalgebra::SMatrix<f64, N_GLOBALS, N_GLOBALS>;
 
 /// Where each global state stands in a [`GlobalVector`].
 pub mod index {

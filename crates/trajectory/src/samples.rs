@@ -172,10 +172,10 @@ impl Trajectory {
     /// Composes a correction into every sample: `p ← p + δt`, `R ← Exp(δr) R` (Kaul 2015, eq. 3).
     ///
     /// There is one `[δr, δt]` per sample.
-    pub fn correct(&mut self, corrections: &[[Vector3<f64>; 2]]) {
-        for (n, [dr, dp]) in corrections.iter().enumerate() {
-            self.positions[n] += dp;
-            self.rotations[n] = so3::turned(dr, &self.rotations[n]);
+    pub fn correct(&mut self, corrections: &[[f64; 6]]) {
+        for (n, &[a, b, c, x, y, z]) in corrections.iter().enumerate() {
+            self.positions[n] += Vector3::new(x, y, z);
+            self.rotations[n] = so3::turned(&Vector3::new(a, b, c), &self.rotations[n]);
         }
         self.steps = steps_in_body(&self.rotations, std::mem::take(&mut self.steps));
     }
@@ -242,7 +242,7 @@ mod tests {
         let mut trajectory = spinning();
         let before = trajectory.pose(5.5);
         let dr = Vector3::new(0.3, 0.0, 0.0);
-        trajectory.correct(&[[dr, Vector3::new(0.0, 1.0, 0.0)]; 101]);
+        trajectory.correct(&[[0.3, 0.0, 0.0, 0.0, 1.0, 0.0]; 101]);
         let after = trajectory.pose(5.5);
         let turn = so3::matrix(&so3::exp(&dr));
         assert!((after.R - turn * before.R).norm() < 1e-12);

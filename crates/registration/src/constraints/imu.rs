@@ -4,7 +4,7 @@
 use bentwing_trajectory::{CorrectionSpline, Imu, NodeForce, Trajectory, so3};
 use nalgebra::{Matrix3, Vector3};
 
-use super::{StencilRows, add_stencil};
+use super::stencil::{StencilRows, add_stencil};
 use crate::{Globals, ImuNoise, NormalEquations, index};
 
 /// `e = dθ_n/dt − b_g − Log(R_nᵀ R_{n+1})/dt`, rad/s, imu frame.

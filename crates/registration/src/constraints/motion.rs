@@ -4,7 +4,7 @@
 use bentwing_trajectory::{CorrectionSpline, Trajectory, so3};
 use nalgebra::{Matrix3, Vector3};
 
-use super::{StencilRows, add_stencil};
+use super::stencil::{StencilRows, add_stencil};
 use crate::{NormalEquations, Settings};
 
 /// Change of the angular rate around sample `n`, rad/s², imu frame; `1 <= n < len - 1`.

@@ -9,7 +9,7 @@ use std::ops::Range;
 use bentwing_trajectory::{CorrectionSpline, Trajectory, so3};
 use nalgebra::{Matrix3, Vector3};
 
-use super::{StencilRows, add_stencil};
+use super::stencil::{StencilRows, add_stencil};
 use crate::NormalEquations;
 
 /// Slower than this nothing flies, m/s and rad/s: a trajectory that rests was made so.

@@ -108,9 +108,9 @@ pub fn add_globals(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::RowGroup;
     use crate::constraints::testing::{Scene, assert_row};
     use crate::placed::place;
-    use crate::rows::RowGroup;
     use proptest::prelude::*;
 
     proptest! {

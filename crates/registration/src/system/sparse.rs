@@ -8,9 +8,9 @@ use faer::sparse::linalg::LltError;
 use faer::sparse::linalg::solvers::{Llt, SymbolicLlt};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMat};
 
+use super::error::SolveError;
 use super::layout::Layout;
-use super::{SolveError, singular};
-use crate::NormalEquations;
+use super::normal_equations::NormalEquations;
 
 /// Where the entries of the lower triangle are, column by column, and how it is factorized.
 pub(super) struct Pattern {
@@ -52,7 +52,7 @@ impl Pattern {
         let matrix = SparseColMatRef::new(self.matrix.as_ref(), &values);
         match Llt::try_new_with_symbolic(self.symbolic.clone(), matrix, Side::Lower) {
             Ok(llt) => Ok(llt),
-            Err(LltError::Numeric(_)) => Err(singular(equations, &self.layout)),
+            Err(LltError::Numeric(_)) => Err(self.layout.singular(equations)),
             Err(e) => Err(SolveError::Factorization(e.to_string())),
         }
     }

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Surfels of an earlier stretch of the trajectory, which does not move any more.
 
-use bentwing_neighbors::Grid;
 use bentwing_surfels::SurfelSet;
 use bentwing_trajectory::Trajectory;
 use nalgebra::Vector3;
 
-use crate::placed::{PlacedSurfel, place};
-use crate::{Globals, PoseResponse, matches::grid_of};
+use crate::neighbors::Grid;
+use crate::placed::{PlacedSurfel, grid_of, place};
+use crate::{Globals, PoseResponse};
 
 /// Surfels from poses that are final (Kaul 2015, section 2.1), with their search grids.
 ///
@@ -106,10 +106,9 @@ impl FixedView {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::N_GLOBALS;
     use crate::constraints::surfel_match::add_globals;
     use crate::constraints::testing::Scene;
-    use crate::response::follow;
+    use crate::{N_GLOBALS, follow};
     use proptest::prelude::*;
 
     proptest! {

@@ -1,19 +1,10 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The constraints: each gives residuals, exact Jacobians and weights.
-
-pub mod imu;
-pub mod initial;
-pub mod motion;
-pub mod prior;
-pub mod rest;
-pub mod surfel_match;
-pub mod velocity;
+//! Rows of neighbouring samples.
 
 use bentwing_trajectory::StencilWeights;
 use nalgebra::Matrix3;
 
-use crate::NormalEquations;
-use crate::rows::RowGroup;
+use crate::{NormalEquations, RowGroup};
 
 /// Rows of neighbouring samples of the trajectory, which mostly share their five control points.
 pub(crate) struct StencilRows<'a> {
@@ -63,6 +54,3 @@ pub(crate) fn add_stencil(
         }
     }
 }
-
-#[cfg(test)]
-pub(crate) mod testing;

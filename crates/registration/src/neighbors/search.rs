@@ -11,8 +11,7 @@ use std::ops::Range;
 use pulp::Arch;
 use rayon::prelude::*;
 
-use crate::Grid;
-use crate::grid::LANES;
+use super::grid::{Grid, LANES};
 
 /// Marks an empty place in a list of neighbours.
 pub const NONE: u32 = u32::MAX;

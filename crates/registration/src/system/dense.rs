@@ -8,9 +8,9 @@ use faer::linalg::cholesky::llt::factor::{
 use faer::linalg::cholesky::llt::solve::solve_in_place;
 use faer::{Mat, Par, Spec};
 
+use super::error::SolveError;
 use super::layout::Layout;
-use super::{SolveError, singular};
-use crate::NormalEquations;
+use super::normal_equations::NormalEquations;
 
 /// The factor in the lower triangle; what is above the diagonal means nothing.
 #[derive(Clone, Debug)]
@@ -29,7 +29,7 @@ impl DenseLlt {
         );
         match factorized {
             Ok(_) => Ok(Self(matrix)),
-            Err(_) => Err(singular(equations, layout)),
+            Err(_) => Err(layout.singular(equations)),
         }
     }
 

@@ -2,7 +2,7 @@
 
 use super::testing::equations;
 use super::*;
-use crate::rows::RowGroup;
+use crate::RowGroup;
 
 #[test]
 fn dense_and_sparse_solutions_agree() {

@@ -6,21 +6,18 @@
     reason = "only what is inlined into a dispatched function uses the machine's instructions"
 )]
 
-use bentwing_neighbors::{Grid, Search, claimed_pairs, mutual_pairs};
 use bentwing_trajectory::Head;
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
+use super::fixed_view::FixedView;
 use crate::constraints::surfel_match::{self, MatchPlane};
-use crate::fixed_view::FixedView;
-use crate::placed::{Placed, PlacedSurfel};
+use crate::neighbors::{Grid, claimed_pairs, mutual_pairs};
+use crate::placed::{Placed, grid_of};
 use crate::robust::cauchy_weight;
-use crate::rows::RowGroup;
-use crate::solve::Solution;
-use crate::{GlobalVector, Globals, Health, N_GLOBALS, NormalEquations, Settings};
-
-/// Features are searched within cells of this size, in voxels.
-const CELL: f32 = 1.0;
+use crate::{
+    GlobalVector, Globals, Health, N_GLOBALS, NormalEquations, RowGroup, Settings, Solution,
+};
 
 /// What a surfel is matched to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -44,20 +41,6 @@ pub struct Match {
 
 /// First control points of the two sides; fixed views have none.
 type Group = (usize, Option<usize>);
-
-/// The search grid of placed surfels of one level.
-pub fn grid_of(surfels: &[PlacedSurfel], voxel_size: f64) -> Grid {
-    let positions: Vec<[f32; 3]> = surfels
-        .iter()
-        .map(|s| (s.mean / voxel_size).cast::<f32>().into())
-        .collect();
-    let normals: Vec<[f32; 3]> = surfels
-        .iter()
-        .map(|s| s.normal.cast::<f32>().into())
-        .collect();
-    let times: Vec<f64> = surfels.iter().map(|s| s.time).collect();
-    Grid::new(&positions, &normals, &times, CELL)
-}
 
 /// Mutual nearest neighbours on every level, within the window and with the fixed views.
 pub fn find(placed: &Placed, views: &[&FixedView], settings: &Settings) -> Vec<Match> {
@@ -90,15 +73,6 @@ pub fn find(placed: &Placed, views: &[&FixedView], settings: &Settings) -> Vec<M
     matches
 }
 
-/// The search for matches.
-pub fn search(settings: &Settings) -> Search {
-    Search {
-        k: settings.n_neighbors,
-        max_distance: settings.max_match_distance as f32,
-        min_time_gap: settings.min_match_gap as f32,
-    }
-}
-
 /// Pairs of the surfels of one level, which are in `grid`, among themselves or with a view.
 fn find_on_level(
     level: usize,
@@ -107,7 +81,7 @@ fn find_on_level(
     grid: &Grid,
     settings: &Settings,
 ) -> Vec<Pair> {
-    let search = search(settings);
+    let search = settings.search();
     let first = placed.level_starts[level] as u32;
     let Some((v, view)) = view else {
         let nearest = grid.nearest(grid, &search);

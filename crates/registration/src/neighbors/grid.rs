@@ -3,12 +3,10 @@
 
 use std::ops::Range;
 
+use bentwing_voxels::VoxelKey;
+
 /// Features whose distances are computed together.
 pub(crate) const LANES: usize = 16;
-
-const BITS: u32 = 21;
-const OFFSET: i64 = 1 << (BITS - 1);
-const MASK: u64 = (1 << BITS) - 1;
 
 /// Features sorted by grid cell, as a structure of arrays.
 ///
@@ -17,7 +15,7 @@ const MASK: u64 = (1 << BITS) - 1;
 #[derive(Clone, Debug)]
 pub struct Grid {
     /// Key of each non-empty cell, increasing.
-    cell_keys: Vec<u64>,
+    cell_keys: Vec<VoxelKey>,
     /// Features of cell `c` are `cell_starts[c] .. cell_starts[c + 1]`.
     cell_starts: Vec<u32>,
     /// Original index of each sorted feature.
@@ -37,7 +35,7 @@ impl Grid {
         times: &[f64],
         cell_size: f32,
     ) -> Self {
-        let mut keyed: Vec<(u64, u32)> = (0u32..)
+        let mut keyed: Vec<(VoxelKey, u32)> = (0u32..)
             .zip(positions)
             .map(|(i, p)| (key_of(p, cell_size), i))
             .collect();
@@ -92,7 +90,7 @@ impl Grid {
     }
 
     /// Key of cell `c`.
-    pub(crate) fn cell_key(&self, c: usize) -> u64 {
+    pub(crate) fn cell_key(&self, c: usize) -> VoxelKey {
         self.cell_keys[c]
     }
 
@@ -122,16 +120,16 @@ impl Grid {
     }
 
     /// The nine columns of three cells around the cell with `key`, the middle one first.
-    pub(crate) fn columns_around(&self, key: u64) -> [Column; 9] {
-        let [x, y, z] = unpack(key);
+    pub(crate) fn columns_around(&self, key: VoxelKey) -> [Column; 9] {
+        let [x, y, z] = key.coordinates();
         let side = |i: i64, step: i64| match step {
             -1 => (1.0, i as f32 * self.cell_size),
             0 => (0.0, 0.0),
             _ => (-1.0, (i + 1) as f32 * self.cell_size),
         };
         STEPS.map(|(dx, dy)| {
-            let first = pack(x + dx, y + dy, z - 1);
-            let last = pack(x + dx, y + dy, z + 1);
+            let first = VoxelKey::new([x + dx, y + dy, z - 1]);
+            let last = VoxelKey::new([x + dx, y + dy, z + 1]);
             let from = self.cell_keys.partition_point(|&k| k < first);
             let n = self.cell_keys[from..]
                 .iter()
@@ -188,17 +186,6 @@ fn gather(order: &[u32], value: impl Fn(usize) -> f32) -> Vec<f32> {
     sorted.chain([f32::INFINITY; LANES - 1]).collect()
 }
 
-fn key_of(p: &[f32; 3], cell_size: f32) -> u64 {
-    let cell = |c: f32| (c / cell_size).floor() as i64;
-    pack(cell(p[0]), cell(p[1]), cell(p[2]))
-}
-
-fn pack(x: i64, y: i64, z: i64) -> u64 {
-    [x, y, z]
-        .iter()
-        .fold(0, |key, i| key << BITS | ((i + OFFSET) as u64 & MASK))
-}
-
-fn unpack(key: u64) -> [i64; 3] {
-    [key >> (2 * BITS), key >> BITS & MASK, key & MASK].map(|i| i as i64 - OFFSET)
+fn key_of(p: &[f32; 3], cell_size: f32) -> VoxelKey {
+    VoxelKey::of_whole(p.map(|c| f64::from((c / cell_size).floor())))
 }

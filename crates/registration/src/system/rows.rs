@@ -9,8 +9,8 @@
 use faer::linalg::matmul::triangular::{BlockStructure, matmul};
 use faer::{Accum, Mat, MatRef, Par};
 
-use crate::normal_equations::Block;
-use crate::{GlobalVector, N_GLOBALS, NormalEquations};
+use super::normal_equations::{Block, NormalEquations};
+use crate::globals::{GlobalVector, N_GLOBALS};
 
 /// Rows that are gathered before they are multiplied; with their block they fit a core's cache.
 const GATHERED: usize = 96;

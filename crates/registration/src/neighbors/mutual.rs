@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Keeps the pairs that found each other.
 
-use crate::{NONE, Neighbors};
+use super::search::{NONE, Neighbors};
 
 /// Pairs `(a, b)`, `a < b`, of a set searched in itself in which each is among the `k` first of the
 /// other, ordered by `a`, then by distance.
@@ -45,7 +45,7 @@ pub fn claimed_pairs(nearest: &Neighbors, n_targets: usize) -> Vec<(u32, u32)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Grid, Search};
+    use crate::neighbors::{Grid, Search};
 
     #[test]
     fn a_crowded_neighbour_does_not_answer_every_query() {

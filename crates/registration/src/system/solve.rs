@@ -1,45 +1,24 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Cholesky solution of the normal equations: dense for a window, sparse beyond.
 
-mod dense;
-mod layout;
-mod sparse;
-
 use std::ops::Range;
 
 use faer::Mat;
 use faer::linalg::solvers::Solve;
 use faer::sparse::linalg::solvers::Llt as SparseLlt;
 use nalgebra::DMatrix;
-use thiserror::Error;
 
-use crate::response::{PoseResponse, UNMOVED};
-use crate::{GlobalMatrix, GlobalVector, N_GLOBALS, NormalEquations};
-use dense::DenseLlt;
-use layout::Layout;
-use sparse::Pattern;
+use super::dense::DenseLlt;
+use super::error::SolveError;
+use super::layout::Layout;
+use super::normal_equations::NormalEquations;
+use super::response::{PoseResponse, UNMOVED, followed};
+use super::sparse::Pattern;
+use crate::globals::{GlobalMatrix, GlobalVector, N_GLOBALS};
 
 /// Up to this number of unknowns the dense factorization of a window is at least about as fast, for
 /// nearly all of its blocks are there (measured with `benches/kernels.py solve/window`).
 const DENSE_LIMIT: usize = 1250;
-
-/// Why the normal equations have no solution.
-#[derive(Debug, Error, PartialEq)]
-#[non_exhaustive]
-pub enum SolveError {
-    /// An unknown that nothing constrains.
-    #[error("the normal equations are singular at {unknown}")]
-    Singular {
-        /// Name of the first unknown without information.
-        unknown: String,
-    },
-    /// The equations hold NaN or infinity.
-    #[error("the normal equations hold a value that is not finite")]
-    NotFinite,
-    /// The factorization gave up for a reason of its own (memory, index range).
-    #[error("the sparse factorization failed: {0}")]
-    Factorization(String),
-}
 
 /// Solution of the normal equations.
 #[derive(Clone, Debug)]
@@ -50,6 +29,15 @@ pub struct Solution {
     pub globals: GlobalVector,
 }
 
+impl Solution {
+    /// Sets the control points that follow the global states.
+    pub fn complete(&mut self, ties: &[PoseResponse]) {
+        for (knot, tie) in self.knots.iter_mut().zip(ties) {
+            *knot = followed(tie, &self.globals);
+        }
+    }
+}
+
 /// What a system says of the global states when everything else is at its best.
 #[derive(Clone, Debug)]
 pub struct Marginals {
@@ -57,16 +45,6 @@ pub struct Marginals {
     pub covariance: GlobalMatrix,
     /// How the control points follow them.
     pub responses: Vec<PoseResponse>,
-}
-
-impl Marginals {
-    /// Of a system that was never solved.
-    pub fn unknown(n_controls: usize) -> Self {
-        Self {
-            covariance: GlobalMatrix::zeros(),
-            responses: vec![UNMOVED; n_controls],
-        }
-    }
 }
 
 #[derive(Clone, Debug)]
@@ -113,7 +91,7 @@ impl Solver {
         frozen: &[bool; N_GLOBALS],
     ) -> Result<Factorized, SolveError> {
         let layout = Layout::new(equations.n_controls(), n_clamped, frozen);
-        let gradient = gradient(equations, &layout);
+        let gradient = layout.gradient(equations);
         if !gradient.col(0).iter().all(|v| v.is_finite()) {
             return Err(SolveError::NotFinite);
         }
@@ -139,42 +117,6 @@ impl Solver {
         let kept = self.pattern.take().filter(|p| p.fits(equations, layout));
         let pattern = kept.map_or_else(|| Pattern::new(equations, layout), Ok)?;
         Ok(self.pattern.insert(pattern))
-    }
-}
-
-/// A system `A x = b` as other solvers take it.
-#[derive(Clone, Debug)]
-pub struct System {
-    /// Where the columns of the lower triangle of `A` begin and the last one ends.
-    pub column_starts: Vec<usize>,
-    /// Rows of its entries, column by column.
-    pub rows: Vec<usize>,
-    /// Its entries.
-    pub values: Vec<f64>,
-    /// `b`; the negative gradient.
-    pub right: Vec<f64>,
-}
-
-impl System {
-    /// The system that [`Solver::factorize`] factorizes.
-    ///
-    /// # Errors
-    /// When it has no symbolic factorization.
-    pub fn new(
-        equations: &NormalEquations,
-        n_clamped: usize,
-        frozen: &[bool; N_GLOBALS],
-    ) -> Result<Self, SolveError> {
-        let layout = Layout::new(equations.n_controls(), n_clamped, frozen);
-        let pattern = Pattern::new(equations, &layout)?;
-        let (starts, rows) = pattern.structure();
-        let gradient = gradient(equations, &layout);
-        Ok(Self {
-            column_starts: starts.to_vec(),
-            rows: rows.to_vec(),
-            values: pattern.values(equations),
-            right: gradient.col_as_slice(0).iter().map(|g| -g).collect(),
-        })
     }
 }
 
@@ -272,35 +214,6 @@ impl Factorized {
             }
         }
         responses
-    }
-}
-
-fn gradient(equations: &NormalEquations, layout: &Layout) -> Mat<f64> {
-    let mut gradient = Mat::zeros(layout.len(), 1);
-    for control in layout.n_clamped..layout.n_controls {
-        let first = 6 * (control - layout.n_clamped);
-        for (i, v) in equations.knot_gradient(control).iter().enumerate() {
-            gradient[(first + i, 0)] = *v;
-        }
-    }
-    for (i, &g) in layout.active.iter().enumerate() {
-        gradient[(layout.n_knot_unknowns() + i, 0)] = equations.global_gradient[g];
-    }
-    gradient
-}
-
-/// What is wrong where a factorization fails: the unknown with the least information, if all is finite.
-fn singular(equations: &NormalEquations, layout: &Layout) -> SolveError {
-    let controls = layout.n_clamped..layout.n_controls;
-    let knots = controls.flat_map(|c| equations.diagonal(c));
-    let globals = layout.active.iter().map(|&g| equations.corner()[(g, g)]);
-    let diagonal: Vec<f64> = knots.chain(globals).collect();
-    if diagonal.iter().any(|v| !v.is_finite()) {
-        return SolveError::NotFinite;
-    }
-    let weakest = (0..diagonal.len()).min_by(|&a, &b| diagonal[a].total_cmp(&diagonal[b]));
-    SolveError::Singular {
-        unknown: layout.name(weakest.unwrap_or(0)),
     }
 }
 

@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Which unknown of the normal equations is which.
 
-use crate::{N_GLOBALS, index};
+use faer::Mat;
+
+use super::error::SolveError;
+use super::normal_equations::NormalEquations;
+use crate::globals::{N_GLOBALS, index};
 
 /// Numbers the unknowns that are estimated: free control points first, then active globals.
 #[derive(Clone, Debug, PartialEq)]
@@ -50,5 +54,36 @@ impl Layout {
             _ => "motor offset",
         };
         format!("the {name}")
+    }
+
+    /// `AᵀW r` of the unknowns.
+    pub(super) fn gradient(&self, equations: &NormalEquations) -> Mat<f64> {
+        let mut gradient = Mat::zeros(self.len(), 1);
+        for control in self.n_clamped..self.n_controls {
+            let first = 6 * (control - self.n_clamped);
+            for (i, v) in equations.knot_gradient(control).iter().enumerate() {
+                gradient[(first + i, 0)] = *v;
+            }
+        }
+        for (i, &g) in self.active.iter().enumerate() {
+            gradient[(self.n_knot_unknowns() + i, 0)] = equations.global_gradient[g];
+        }
+        gradient
+    }
+
+    /// What is wrong where a factorization fails: the unknown with the least information, if all is
+    /// finite.
+    pub(super) fn singular(&self, equations: &NormalEquations) -> SolveError {
+        let controls = self.n_clamped..self.n_controls;
+        let knots = controls.flat_map(|c| equations.diagonal(c));
+        let globals = self.active.iter().map(|&g| equations.corner()[(g, g)]);
+        let diagonal: Vec<f64> = knots.chain(globals).collect();
+        if diagonal.iter().any(|v| !v.is_finite()) {
+            return SolveError::NotFinite;
+        }
+        let weakest = (0..diagonal.len()).min_by(|&a, &b| diagonal[a].total_cmp(&diagonal[b]));
+        SolveError::Singular {
+            unknown: self.name(weakest.unwrap_or(0)),
+        }
     }
 }

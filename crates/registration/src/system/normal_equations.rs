@@ -3,7 +3,7 @@
 
 use rustc_hash::FxHashMap;
 
-use crate::{GlobalMatrix, GlobalVector, N_GLOBALS};
+use crate::globals::{GlobalMatrix, GlobalVector, N_GLOBALS};
 
 /// A 6×6 block, column by column.
 pub type Block = [[f64; 6]; 6];

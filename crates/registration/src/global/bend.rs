@@ -7,11 +7,11 @@
 //! the normal, always with the same sign from far to near: where hardly anything is plane, the
 //! trajectory would come out too large.
 
-use bentwing_neighbors::Neighbors;
 use bentwing_trajectory::so3;
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
+use crate::neighbors::Neighbors;
 use crate::placed::PlacedSurfel;
 
 /// Neighbours that tell how a surface bends.

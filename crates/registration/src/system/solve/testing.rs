@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Equations to solve in tests.
 
-use crate::NormalEquations;
-use crate::rows::RowGroup;
+use crate::{NormalEquations, RowGroup};
 
 /// Equations of a chain of control points with loops, from pseudo-random rows.
 pub fn equations(n: usize) -> NormalEquations {

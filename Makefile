@@ -130,7 +130,7 @@ deny: ## licences, advisories and sources of the crates (needs cargo-deny)
 
 .PHONY: bench
 bench: $(CORE) ## kernels (criterion), then accuracy and speed from recording to map
-	$(if $(filter-out benches/lib.rs,$(wildcard benches/*.rs)),cargo bench --workspace --bench '*')
+	cargo bench --workspace --bench '*'
 	$(BIN)/python benches/pipeline.py $(if $(SCENARIOS),$(SCENARIOS))
 
 .PHONY: docs

@@ -3,6 +3,7 @@
 #![forbid(unsafe_code)]
 
 mod chain;
+pub mod defaults;
 mod features;
 mod hall;
 pub mod npy;
@@ -11,14 +12,14 @@ mod window;
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
-use bentwing_registration::{Globals, ImuNoise, Settings as Registration};
-use bentwing_surfels::{Points, Settings as Surfels, SurfelSet};
+use bentwing_registration::{Globals, Settings as Registration};
+use bentwing_surfels::{Points, SurfelSet};
 use bentwing_trajectory::{Head, Imu, Trajectory, so3};
 pub use chain::chain;
 pub use features::Features;
 pub use window::prior;
 
-use nalgebra::{Isometry3, Matrix3, Rotation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, UnitQuaternion, Vector3};
 
 /// Interval of the trajectory's samples, s.
 pub const DT: f64 = 0.01;
@@ -103,7 +104,7 @@ impl Scanner {
             Self::Hokuyo => Matrix3::new(0.0, 0.0, 1.0, 0.0, 1.0, 0.0, -1.0, 0.0, 0.0),
             Self::Vlp16 => Matrix3::identity(),
         };
-        UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(R))
+        so3::of_matrix(R)
     }
 
     /// Times and directions in the lidar frame.
@@ -204,7 +205,7 @@ impl Flight {
                 stamps: &self.stamps[part],
                 angles: &[],
             };
-            let settings = surfel_settings(self.scanner.sigma());
+            let settings = defaults::surfels(self.scanner.sigma());
             Arc::new(bentwing_surfels::extract(
                 points,
                 &self.trajectory,
@@ -217,27 +218,7 @@ impl Flight {
 
     /// Settings of the registration for this scanner.
     pub fn settings(&self) -> Registration {
-        Registration {
-            knot_interval: 0.2,
-            range_sigma: self.scanner.sigma(),
-            n_neighbors: 2,
-            max_match_distance: 1.0,
-            min_match_gap: 0.3,
-            first_cauchy_scale: 3.0,
-            cauchy_scale: 1.0,
-            max_outer: 5,
-            n_inner: 2,
-            min_translation: 5e-4,
-            min_rotation: 2e-5,
-            velocity_sigma: 0.5,
-            rate_sigma: 0.5,
-            imu_noise: ImuNoise {
-                gyro: 5e-3,
-                accel: 0.12,
-            },
-            motion_accel_density: 1.5,
-            motion_angular_density: 1.0,
-        }
+        defaults::registration(self.scanner.sigma())
     }
 }
 
@@ -248,23 +229,6 @@ impl Flight {
 pub fn one_thread() -> rayon::ThreadPool {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
     pool.expect("one thread")
-}
-
-/// The estimator's defaults.
-pub fn surfel_settings(range_sigma: f64) -> Surfels {
-    Surfels {
-        voxel_size: 0.4,
-        n_levels: 4,
-        max_gap: 0.08,
-        max_span: 0.3,
-        min_points: 6,
-        min_planarity: 0.3,
-        min_width_ratio: 0.03,
-        min_width: 0.05,
-        min_incidence_cosine: 0.1,
-        max_rate: 4000.0,
-        range_sigma,
-    }
 }
 
 /// Pseudo-random numbers (splitmix64), the same on every machine.

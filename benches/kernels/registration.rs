@@ -21,12 +21,17 @@ fn window(c: &mut Criterion) {
         let sets = flight.surfels();
         let first: Vec<_> = sets[..2].iter().map(AsRef::as_ref).collect();
         let view = FixedView::freeze(&first, 0.0, 1.5, &flight.trajectory, &[], &flight.globals);
-        for (part, max_outer, n_inner) in [("1x1", 1, 1), ("1x3", 1, 3), ("whole", 5, 2)] {
-            let settings = Settings {
-                max_outer,
-                n_inner,
-                ..flight.settings()
-            };
+        let defaults = flight.settings();
+        let iterations = |max_outer, n_inner| Settings {
+            max_outer,
+            n_inner,
+            ..defaults.clone()
+        };
+        for (part, settings) in [
+            ("1x1", iterations(1, 1)),
+            ("1x3", iterations(1, 3)),
+            ("whole", defaults.clone()),
+        ] {
             let prior = prior();
             group.bench_function(format!("{name}/{part}"), |b| {
                 b.iter(|| {

@@ -3,20 +3,15 @@
 #![allow(missing_docs, reason = "criterion's macros make public items")]
 
 use bentwing_benches::{Features, Scanner};
-use bentwing_neighbors::{Grid, Search, mutual_pairs};
+use bentwing_registration::neighbors::{Grid, mutual_pairs};
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
-
-const SEARCH: Search = Search {
-    k: 2,
-    max_distance: 1.0,
-    min_time_gap: 0.3,
-};
 
 fn search(c: &mut Criterion) {
     let pool = bentwing_benches::one_thread();
     let mut group = c.benchmark_group("neighbors");
     for (name, scanner) in [("hokuyo_5s", Scanner::Hokuyo), ("vlp16_5s", Scanner::Vlp16)] {
         let flight = scanner.fly(5.0);
+        let search = flight.settings().search();
         for level in [0, 2] {
             let features = Features::of(&flight, level);
             let Features {
@@ -32,8 +27,8 @@ fn search(c: &mut Criterion) {
             });
             group.bench_function(format!("{name}/level_{level}/mutual"), |b| {
                 b.iter(|| {
-                    let nearest = pool.install(|| grid.nearest(&grid, &SEARCH));
-                    mutual_pairs(&nearest, SEARCH.k).count()
+                    let nearest = pool.install(|| grid.nearest(&grid, &search));
+                    mutual_pairs(&nearest, search.k).count()
                 });
             });
         }

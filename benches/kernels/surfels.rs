@@ -2,7 +2,7 @@
 //! Extraction of the surfels of one second.
 #![allow(missing_docs, reason = "criterion's macros make public items")]
 
-use bentwing_benches::{Scanner, surfel_settings};
+use bentwing_benches::{Scanner, defaults};
 use bentwing_surfels::{Points, extract};
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 
@@ -11,7 +11,7 @@ fn extraction(c: &mut Criterion) {
     let mut group = c.benchmark_group("surfels");
     for (name, scanner) in [("hokuyo_1s", Scanner::Hokuyo), ("vlp16_1s", Scanner::Vlp16)] {
         let flight = scanner.fly(1.0);
-        let settings = surfel_settings(scanner.sigma());
+        let settings = defaults::surfels(scanner.sigma());
         group.throughput(Throughput::Elements(flight.points.len() as u64));
         group.bench_function(name, |b| {
             b.iter(|| {

@@ -9,8 +9,8 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-use bentwing_benches::{Features, Flight, Scanner, chain, npy, one_thread, prior, surfel_settings};
-use bentwing_neighbors::{Grid, Search};
+use bentwing_benches::{Features, Flight, Scanner, chain, defaults, npy, one_thread, prior};
+use bentwing_registration::neighbors::Grid;
 use bentwing_registration::{NormalEquations, Solver, System};
 use bentwing_surfels::{Points, extract, place_points};
 
@@ -18,12 +18,6 @@ use bentwing_surfels::{Points, extract, place_points};
 type Cases = BTreeMap<String, Box<dyn FnMut() + Send>>;
 
 type Failure = Box<dyn std::error::Error + Send + Sync>;
-
-const SEARCH: Search = Search {
-    k: 2,
-    max_distance: 1.0,
-    min_time_gap: 0.3,
-};
 
 fn main() -> Result<(), Failure> {
     let folder = std::env::args()
@@ -96,22 +90,25 @@ fn neighbors(
     let folder = folder_of(folder, &case)?;
     npy::write(&folder.join("features.npy"), &features.rows(), 6)?;
     npy::write(&folder.join("times.npy"), &features.times, 0)?;
-    let search = move || {
+    // Of the settings only the noise, which the search does not know, depends on the scanner.
+    let search = defaults::registration(0.0).search();
+    let k = search.k;
+    let find = move || {
         let Features {
             positions,
             normals,
             times,
         } = &features;
         let grid = Grid::new(positions, normals, times, 1.0);
-        grid.nearest(&grid, &SEARCH)
+        grid.nearest(&grid, &search)
     };
-    let found = search();
-    let mut lists = vec![u32::MAX; found.len() * SEARCH.k];
-    for (i, list) in lists.chunks_exact_mut(SEARCH.k).enumerate() {
+    let found = find();
+    let mut lists = vec![u32::MAX; found.len() * k];
+    for (i, list) in lists.chunks_exact_mut(k).enumerate() {
         list[..found.of(i).len()].copy_from_slice(found.of(i));
     }
-    npy::write(&folder.join("found.npy"), &lists, SEARCH.k)?;
-    cases.insert(case, Box::new(move || drop(search())));
+    npy::write(&folder.join("found.npy"), &lists, k)?;
+    cases.insert(case, Box::new(move || drop(find())));
     Ok(())
 }
 
@@ -122,7 +119,7 @@ fn surfels(cases: &mut Cases, folder: &Path, name: &str, flight: Flight) -> Resu
     let (trajectory, head) = (&flight.trajectory, &flight.globals.head);
     let placed = place_points(&flight.points, &flight.stamps, &[], trajectory, head);
     npy::write(&folder.join("points.npy"), placed.as_flattened(), 3)?;
-    let settings = surfel_settings(flight.settings().range_sigma);
+    let settings = defaults::surfels(flight.settings().range_sigma);
     let work = move || {
         let points = Points {
             points: &flight.points,

@@ -464,6 +464,12 @@ class Registration:
     def covariance(self) -> NDArray[np.float64]:
         """Covariance (20, 20) of the slow states; zero where frozen."""
 
+    def sample_covariances(self) -> NDArray[np.float64]:
+        """Compute the covariances (N, 6, 6) of the correction of each sample, rotation first.
+
+        In rad and m, perturbed on the left in the map frame; zero where the past stays.
+        """
+
     @property
     def offset(self) -> list[float]:
         """Correction (20,) that leads from the prior's mean to `globals`."""

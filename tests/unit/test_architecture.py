@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from support import structure
+from support import rust_uses, structure
 
 if TYPE_CHECKING:
     from support.structure import Arrows
@@ -52,6 +52,13 @@ def test_no_files_import_each_other_in_a_circle() -> None:
         if module not in gathered or module.count(".") > 0
     }
     assert not structure.circles(inside)
+
+
+def test_no_files_of_a_crate_use_each_other_in_a_circle() -> None:
+    arrows = rust_uses.arrows()
+    rows = "registration/src/system/rows.rs"
+    assert "registration/src/system/normal_equations.rs" in arrows[rows]
+    assert not structure.circles(arrows)
 
 
 def test_only_packages_that_compute_import_the_compiled_core() -> None:

@@ -1,41 +1,27 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Cells by their place: blocks of 4³ cells in shards, so that threads fill them without meeting.
 
+use bentwing_voxels::VoxelKey;
 use rustc_hash::FxHashMap;
 
 use crate::cell::Cell;
 
 /// Shards; more than threads, so that they share the work evenly.
-pub(crate) const N_SHARDS: usize = 16;
-/// Bits of one coordinate in a block's key.
-const BITS: u32 = 21;
-const MASK: u64 = (1 << BITS) - 1;
+pub(crate) const N_SHARDS: usize = 1 << SHARD_BITS;
+const SHARD_BITS: u32 = 4;
 const NO_CELL: u32 = u32::MAX;
-
-/// Key of a block; blocks two million apart along an axis share one.
-#[inline]
-pub(crate) fn key_of(block: [i64; 3]) -> u64 {
-    let [x, y, z] = block.map(|c| c as u64 & MASK);
-    x << (2 * BITS) | y << BITS | z
-}
 
 /// Block of a cell, and the cell's place in it.
 #[inline]
-pub(crate) fn block_of(cell: [i64; 3]) -> (u64, usize) {
+pub(crate) fn block_of(cell: [i64; 3]) -> (VoxelKey, usize) {
     let [x, y, z] = cell.map(|c| (c & 3) as usize);
-    (key_of(cell.map(|c| c >> 2)), x << 4 | y << 2 | z)
+    (VoxelKey::new(cell.map(|c| c >> 2)), x << 4 | y << 2 | z)
 }
 
 /// Shard of a block.
 #[inline]
-pub(crate) fn shard_of(key: u64) -> usize {
-    (key.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 60) as usize
-}
-
-/// The cell a point is in.
-#[inline]
-pub(crate) fn cell_of(p: &[f64; 3], edge: f64) -> [i64; 3] {
-    p.map(|c| (c / edge).floor() as i64)
+pub(crate) fn shard_of(block: VoxelKey) -> usize {
+    block.class(SHARD_BITS)
 }
 
 /// Middle of a cell.
@@ -47,7 +33,7 @@ pub(crate) fn middle_of(cell: [i64; 3], edge: f64) -> [f64; 3] {
 /// A share of all blocks.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Shard {
-    places: FxHashMap<u64, u32>,
+    places: FxHashMap<VoxelKey, u32>,
     /// Indices of the cells of each block.
     blocks: Vec<[u32; 64]>,
     pub cells: Vec<Cell>,
@@ -74,13 +60,13 @@ impl Shard {
 
     /// The cells of a block, by their place in it.
     #[inline]
-    pub(crate) fn block(&self, key: u64) -> Option<&[u32; 64]> {
+    pub(crate) fn block(&self, key: VoxelKey) -> Option<&[u32; 64]> {
         self.places.get(&key).map(|&b| &self.blocks[b as usize])
     }
 
     /// Index of the cell at a place of a block.
     #[inline]
-    pub(crate) fn index(&self, key: u64, place: usize) -> Option<u32> {
+    pub(crate) fn index(&self, key: VoxelKey, place: usize) -> Option<u32> {
         let index = self.block(key)?[place];
         (index != NO_CELL).then_some(index)
     }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! What is known of one cell of space.
 
-use bentwing_surfels::sym3;
+use bentwing_voxels::Moments;
 use nalgebra::{Matrix3, Vector3};
 
 /// Time is told in so many steps; one bit each.
@@ -11,7 +11,7 @@ pub(crate) const N_BINS: usize = 256;
 pub(crate) type Bins = [u64; N_BINS / 64];
 
 /// Fewer points have no surface.
-const MIN_POINTS: f64 = 10.0;
+const MIN_POINTS: u32 = 10;
 /// A cell's points must spread across by this share of its edge for a plane: those of one scan
 /// line leave the normal free to turn about the line.
 const MIN_SPREAD: f64 = 0.1;
@@ -22,83 +22,7 @@ const BLUR: f64 = 0.125;
 /// A beam so many standard deviations from the middle of a cell's points went through them.
 const CORE: f64 = 1.4;
 /// Of few points the extent is not known either.
-const FEW: f64 = 5.0;
-
-/// Sums over the points of a cell, relative to its middle.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Sums {
-    pub n: f64,
-    pub sum: [f64; 3],
-    /// xx, xy, xz, yy, yz, zz.
-    pub products: [f64; 6],
-}
-
-impl Sums {
-    pub(crate) fn add_point(&mut self, [x, y, z]: [f64; 3]) {
-        self.n += 1.0;
-        for (a, b) in self.sum.iter_mut().zip([x, y, z]) {
-            *a += b;
-        }
-        let products = [x * x, x * y, x * z, y * y, y * z, z * z];
-        for (a, b) in self.products.iter_mut().zip(products) {
-            *a += b;
-        }
-    }
-
-    /// Adds sums whose origin lies at `shift` from this one's.
-    pub(crate) fn add(&mut self, other: &Self, shift: [f64; 3]) {
-        let (n, s) = (other.n, other.sum);
-        self.n += n;
-        for axis in 0..3 {
-            self.sum[axis] += s[axis] + n * shift[axis];
-        }
-        let pairs = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
-        for (k, (i, j)) in pairs.into_iter().enumerate() {
-            self.products[k] +=
-                other.products[k] + s[i] * shift[j] + shift[i] * s[j] + n * shift[i] * shift[j];
-        }
-    }
-
-    fn mean_and_covariance(&self) -> (Vector3<f64>, Matrix3<f64>) {
-        let mean = Vector3::from(self.sum) / self.n;
-        let [xx, xy, xz, yy, yz, zz] = self.products.map(|p| p / self.n);
-        let second = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
-        (mean, second - mean * mean.transpose())
-    }
-
-    /// The plane through the points, where they have one.
-    pub(crate) fn plane(&self, edge: f64) -> Option<Plane> {
-        if self.n < MIN_POINTS {
-            return None;
-        }
-        let (mean, covariance) = self.mean_and_covariance();
-        let e = sym3::eigen(&covariance);
-        let spread = e.values[1].max(0.0).sqrt();
-        if spread < MIN_SPREAD * edge {
-            return None;
-        }
-        // With the plane itself fitted to the n points.
-        let thickness = (e.values[0].max(0.0) * self.n / (self.n - 3.0)).sqrt();
-        Some(Plane {
-            mean: mean.map(|v| v as f32).into(),
-            normal: e.normal.map(|v| v as f32).into(),
-            thickness: thickness as f32,
-            is_flat: thickness < FLAT * spread,
-        })
-    }
-
-    /// The ellipsoid a beam must pass through to have been where the points are.
-    pub(crate) fn core(&self, edge: f64) -> Option<Core> {
-        if self.n < 1.0 {
-            return None;
-        }
-        let (mean, covariance) = self.mean_and_covariance();
-        let blur = if self.n < FEW { 1.6 * BLUR } else { BLUR } * edge;
-        let wide = covariance + Matrix3::from_diagonal_element(blur * blur);
-        let inverse = wide.try_inverse()?;
-        Some(Core { mean, inverse })
-    }
-}
+const FEW: u32 = 5;
 
 /// A plane through the points of a cell, relative to its middle.
 #[derive(Clone, Copy, Debug)]
@@ -110,6 +34,29 @@ pub(crate) struct Plane {
     pub is_flat: bool,
 }
 
+impl Plane {
+    /// The plane through points, where they have one.
+    pub(crate) fn of(sums: &Moments, edge: f64) -> Option<Self> {
+        if sums.n() < MIN_POINTS {
+            return None;
+        }
+        let e = sums.eigen();
+        let spread = e.values[1].max(0.0).sqrt();
+        if spread < MIN_SPREAD * edge {
+            return None;
+        }
+        // With the plane itself fitted to the n points.
+        let n = f64::from(sums.n());
+        let thickness = (e.values[0].max(0.0) * n / (n - 3.0)).sqrt();
+        Some(Self {
+            mean: sums.mean().map(|v| v as f32).into(),
+            normal: e.normal.map(|v| v as f32).into(),
+            thickness: thickness as f32,
+            is_flat: thickness < FLAT * spread,
+        })
+    }
+}
+
 /// Where the points of a cell are, relative to its middle.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Core {
@@ -118,6 +65,20 @@ pub(crate) struct Core {
 }
 
 impl Core {
+    /// The ellipsoid a beam must pass through to have been where the points are.
+    pub(crate) fn of(sums: &Moments, edge: f64) -> Option<Self> {
+        if sums.n() == 0 {
+            return None;
+        }
+        let blur = if sums.n() < FEW { 1.6 * BLUR } else { BLUR } * edge;
+        let wide = sums.covariance() + Matrix3::from_diagonal_element(blur * blur);
+        let inverse = wide.try_inverse()?;
+        Some(Self {
+            mean: sums.mean(),
+            inverse,
+        })
+    }
+
     /// Where along a ray that begins at `origin` it comes nearest to the middle of the points, if
     /// it comes nearer than `CORE`.
     pub(crate) fn crossing(&self, origin: &Vector3<f64>, direction: &Vector3<f64>) -> Option<f64> {
@@ -132,7 +93,8 @@ impl Core {
 /// What a survey keeps of a cell.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Cell {
-    pub sums: Sums,
+    /// Relative to the middle of the cell.
+    pub sums: Moments,
     pub hits: Bins,
 }
 
@@ -148,29 +110,6 @@ pub(crate) fn count_without(a: &Bins, b: &Bins) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use proptest::prelude::*;
-
-    proptest! {
-        #[test]
-        fn sums_can_be_moved_to_another_origin(
-            points in prop::collection::vec(prop::array::uniform3(-1.0..1.0_f64), 1..30),
-            shift in prop::array::uniform3(-2.0..2.0_f64),
-        ) {
-            let (mut here, mut there, mut moved) = (Sums::default(), Sums::default(), Sums::default());
-            for &p in &points {
-                here.add_point(p);
-                there.add_point([p[0] + shift[0], p[1] + shift[1], p[2] + shift[2]]);
-            }
-            moved.add(&here, shift);
-            for (a, b) in moved.products.iter().zip(there.products) {
-                prop_assert!((a - b).abs() < 1e-9 * (1.0 + b.abs()) * 30.0);
-            }
-            for (a, b) in moved.sum.iter().zip(there.sum) {
-                prop_assert!((a - b).abs() < 1e-9);
-            }
-        }
-    }
-
     #[test]
     fn the_plane_of_a_noisy_tilted_patch_has_its_normal_and_thickness() {
         let normal = Vector3::new(1.0, -2.0, 2.0) / 3.0;
@@ -178,7 +117,7 @@ mod tests {
             Vector3::new(2.0, 2.0, 1.0) / 3.0,
             Vector3::new(-2.0, 1.0, 2.0) / 3.0,
         );
-        let mut sums = Sums::default();
+        let mut sums = Moments::default();
         for i in 0..20 {
             for j in 0..20 {
                 let off = if (i + j) % 2 == 0 { 0.01 } else { -0.01 };
@@ -186,7 +125,7 @@ mod tests {
                 sums.add_point(p.into());
             }
         }
-        let plane = sums.plane(0.2);
+        let plane = Plane::of(&sums, 0.2);
         assert!(plane.is_some_and(|p| {
             let n = Vector3::from(p.normal).map(f64::from);
             n.dot(&normal).abs() > 0.9999 && (f64::from(p.thickness) - 0.01).abs() < 2e-4
@@ -195,20 +134,20 @@ mod tests {
 
     #[test]
     fn points_on_a_line_have_no_plane() {
-        let mut sums = Sums::default();
+        let mut sums = Moments::default();
         for i in 0..50 {
             sums.add_point([0.004 * f64::from(i), 0.0, 0.0]);
         }
-        assert!(sums.plane(0.2).is_none());
+        assert!(Plane::of(&sums, 0.2).is_none());
     }
 
     #[test]
     fn a_ray_through_the_middle_crosses_and_one_beside_does_not() {
-        let mut sums = Sums::default();
+        let mut sums = Moments::default();
         for i in 0..100 {
             sums.add_point([0.01 * f64::from(i % 10), 0.01 * f64::from(i / 10), 0.0]);
         }
-        let core = sums.core(0.2);
+        let core = Core::of(&sums, 0.2);
         let down = Vector3::new(0.0, 0.0, -1.0);
         let from = |x| Vector3::new(x, 0.045, 2.0);
         assert!(core.is_some_and(|c| {

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The second look: what the cells say about each point.
 
+use bentwing_voxels::{Moments, voxel_of};
 use rayon::prelude::*;
 
-use crate::block::{self, N_SHARDS, Shard, cell_of, middle_of};
-use crate::cell::{Plane, Sums};
+use crate::block::{self, N_SHARDS, Shard, middle_of};
+use crate::cell::Plane;
 
 /// Points per parallel task.
 const CHUNK: usize = 4096;
@@ -12,7 +13,7 @@ const CHUNK: usize = 4096;
 const OFF_THICKNESSES: f32 = 3.0;
 const OFF: f32 = 0.04;
 /// So many points in a cell support each other.
-const SUPPORT: f64 = 2.0;
+const SUPPORT: u32 = 2;
 
 /// Cells of a complete survey.
 #[derive(Clone, Debug)]
@@ -56,7 +57,7 @@ impl Cells {
             let found = |i| Found {
                 plane: plane_of(&shards, edge, s, i),
                 is_moving: moving[s][i],
-                is_supported: shards[s].cells[i].sums.n >= SUPPORT,
+                is_supported: shards[s].cells[i].sums.n() >= SUPPORT,
             };
             (0..shards[s].cells.len()).map(found).collect()
         };
@@ -113,7 +114,7 @@ impl Cells {
     }
 
     fn describe_one(&self, p: &[f64; 3], beam: &[f32; 3]) -> (f32, f32, bool, bool) {
-        let at = cell_of(p, self.edge);
+        let at = voxel_of(p, self.edge);
         let Some(found) = self.at(at) else {
             return (f32::NAN, f32::NAN, false, false);
         };
@@ -142,7 +143,7 @@ impl Cells {
     fn moves_towards(&self, p: &[f64; 3], normal: &[f32; 3], height: f32) -> bool {
         let reach = self.edge.copysign(f64::from(height));
         let beside = [0, 1, 2].map(|a| p[a] + f64::from(normal[a]) * reach);
-        self.at(cell_of(&beside, self.edge))
+        self.at(voxel_of(&beside, self.edge))
             .is_some_and(|f| f.is_moving)
     }
 
@@ -161,7 +162,7 @@ const JOINED_THICKER_BY: f32 = 0.005;
 fn plane_of(shards: &[Shard], edge: f64, s: usize, i: usize) -> Option<Plane> {
     let mut sums = shards[s].cells[i].sums;
     let at = shards[s].coordinates[i];
-    let Some(own) = sums.plane(edge) else {
+    let Some(own) = Plane::of(&sums, edge) else {
         for k in (0..27_i64).filter(|&k| k != 13) {
             add_beside(
                 &mut sums,
@@ -171,7 +172,7 @@ fn plane_of(shards: &[Shard], edge: f64, s: usize, i: usize) -> Option<Plane> {
                 [k / 9 - 1, k / 3 % 3 - 1, k % 3 - 1],
             );
         }
-        return sums.plane(edge);
+        return Plane::of(&sums, edge);
     };
     let steepest = |a: usize, b: usize| {
         if own.normal[b].abs() > own.normal[a].abs() {
@@ -188,16 +189,16 @@ fn plane_of(shards: &[Shard], edge: f64, s: usize, i: usize) -> Option<Plane> {
         let mut joined = sums;
         add_beside(&mut joined, shards, edge, at, offset);
         let limit = JOINED_THICKER * own.thickness + JOINED_THICKER_BY;
-        if let Some(p) = joined.plane(edge).filter(|p| p.thickness < limit) {
+        if let Some(p) = Plane::of(&joined, edge).filter(|p| p.thickness < limit) {
             (plane, sums) = (p, joined);
         }
     }
     Some(plane)
 }
 
-fn add_beside(sums: &mut Sums, shards: &[Shard], edge: f64, at: [i64; 3], offset: [i64; 3]) {
+fn add_beside(sums: &mut Moments, shards: &[Shard], edge: f64, at: [i64; 3], offset: [i64; 3]) {
     if let Some((s, i)) = block::find(shards, [0, 1, 2].map(|a| at[a] + offset[a])) {
         let shift = offset.map(|o| o as f64 * edge);
-        sums.add(&shards[s].cells[i as usize].sums, shift);
+        sums.merge(&shards[s].cells[i as usize].sums.shifted(shift));
     }
 }

@@ -8,10 +8,11 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use bentwing_voxels::VoxelKey;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-use crate::block::{self, Shard, key_of, middle_of, present, shard_of};
+use crate::block::{self, Shard, middle_of, present, shard_of};
 use crate::cell::{Bins, Core, Plane, count_without};
 use crate::rays::Ray;
 use crate::walk::walk;
@@ -51,7 +52,7 @@ fn seen_through(shards: &[Shard], edge: f64, rays: &[Ray], margin: f64) -> Vec<V
         .map(|shard| {
             let cells = shard.cells.iter();
             cells
-                .map(|c| (c.sums.core(edge), c.sums.plane(edge)))
+                .map(|c| (Core::of(&c.sums, edge), Plane::of(&c.sums, edge)))
                 .collect()
         })
         .collect();
@@ -76,7 +77,7 @@ fn seen_through(shards: &[Shard], edge: f64, rays: &[Ray], margin: f64) -> Vec<V
             (0.0, reach),
             4.0 * edge,
             |at, enter, leave| {
-                let key = key_of(at);
+                let key = VoxelKey::new(at);
                 let shard = shard_of(key);
                 let Some(block) = shards[shard].block(key) else {
                     return;

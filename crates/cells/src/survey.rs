@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The first look at a map: cells and beams, from its points chunk by chunk.
 
+use bentwing_voxels::voxel_of;
 use rayon::prelude::*;
 
-use crate::block::{N_SHARDS, Shard, block_of, cell_of, middle_of, shard_of};
+use crate::block::{N_SHARDS, Shard, block_of, middle_of, shard_of};
 use crate::cell::{N_BINS, set};
 use crate::describe::Cells;
 use crate::moving;
@@ -68,7 +69,7 @@ impl Survey {
         let cells: Vec<[i64; 3]> = points
             .par_iter()
             .with_min_len(CHUNK)
-            .map(|p| cell_of(p, edge))
+            .map(|p| voxel_of(p, edge))
             .collect();
         let shards: Vec<u8> = cells
             .par_iter()
@@ -140,9 +141,8 @@ impl Survey {
                 let above = at.map(|c| c >> 1);
                 let (from, to) = (middle_of(at, fine), middle_of(above, coarse));
                 let joined = shards[shard_of(block_of(above).0)].cell_mut(above);
-                joined
-                    .sums
-                    .add(&cell.sums, [0, 1, 2].map(|a| from[a] - to[a]));
+                let shift = [0, 1, 2].map(|a| from[a] - to[a]);
+                joined.sums.merge(&cell.sums.shifted(shift));
                 for (a, b) in joined.hits.iter_mut().zip(cell.hits) {
                     *a |= b;
                 }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The filter: inertial samples carry the state on, sweeps of the lidar correct it.
 
-use bentwing_surfels::thin;
 use bentwing_trajectory::so3;
+use bentwing_voxels::thin;
 use nalgebra::{Matrix3, Matrix6, SMatrix, Vector3};
 
 use crate::drift::Drift;
@@ -384,7 +384,7 @@ impl Filter {
     /// seen comes to lie where the motor is and as far about its axis as the encoder's delay is wrong
     /// at a `rate`, rad/s, however the IMU is mounted on it.
     fn view(&self, rate: f64) -> (Vector3<f64>, Matrix6<f64>) {
-        let R = self.state.pose.R.to_rotation_matrix().into_inner();
+        let R = so3::matrix(&self.state.pose.R);
         let lever = R * self.state.base.t;
         let mut effect = SMatrix::<f64, 6, DIM>::zeros();
         let mut set = |r: usize, c: usize, m: &Matrix3<f64>| {

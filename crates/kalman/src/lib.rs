@@ -2,7 +2,6 @@
 #![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
-mod cells;
 mod drift;
 mod error;
 mod features;
@@ -16,7 +15,7 @@ mod predict;
 mod state;
 mod update;
 
-pub use cells::Memory;
+pub use bentwing_voxels::Memory;
 pub use error::KalmanError;
 pub use features::{Feature, Features, Sweep, features};
 pub use filter::{Filter, Outcome, Pose, Settings, Start};

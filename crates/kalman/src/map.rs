@@ -4,22 +4,22 @@
 //! The paper keeps points and fits a plane to the nearest five of each feature. The rays of a
 //! sparse lidar are decimetres apart; statistics of voxels use all that was ever seen of a surface.
 
-use bentwing_surfels::{Moments, sym3};
+use bentwing_voxels::{MIN_POINTS, MIN_WIDTH, Memory, Moments, VoxelMap, sym3};
 use nalgebra::Vector3;
 
-use crate::cells::{Cells, Memory, Shape};
-
-/// Features of a plane and of a line.
-const MIN_POINTS: u32 = 6;
-/// Least middle standard deviation of a plane, in voxels: less is one scan line, about which the
-/// plane is free to turn.
-const MIN_WIDTH: f64 = 0.07;
 /// Most variance across a plane, as a share of that of its narrower side.
 const MAX_THICKNESS: f64 = 0.1;
 /// Beyond this many features the mean of a surface gains no more: they share the error of the pose.
 const MOST_INDEPENDENT: u32 = 25;
 /// A line is so long at least, in voxels, and so thin at most, m.
 const LINE: (f64, f64) = (0.15, 0.08);
+
+/// What the features of a voxel have in common.
+trait Shape: Sized {
+    /// The shape in a voxel of edge `size` around `middle`, if the features show one; `sigma` is the
+    /// standard deviation of a range, m.
+    fn of(moments: &Moments, middle: &Vector3<f64>, size: f64, sigma: f64) -> Option<Self>;
+}
 
 /// A plane through the features of a voxel.
 #[derive(Clone, Copy, Debug)]
@@ -46,7 +46,7 @@ impl Shape for Plane {
         if moments.n() < MIN_POINTS {
             return None;
         }
-        let e = sym3::eigen(&moments.covariance());
+        let e = moments.eigen();
         let [across, wide, _] = e.values;
         if wide < (MIN_WIDTH * size).powi(2) || across > MAX_THICKNESS * wide {
             return None;
@@ -101,11 +101,28 @@ pub struct MapSettings {
     pub reach: f64,
 }
 
+/// Voxels of one size, their shapes with what was told when these were seen first.
+type Level<S> = VoxelMap<Moments, (S, u32)>;
+
+/// Adds features to a level; returns how many came to a voxel that had no shape.
+fn add<S: Shape>(level: &mut Level<S>, features: &[Vector3<f64>], sigma: f64, birth: u32) -> usize {
+    let points = features.iter().map(|&p| p.into());
+    let (touched, n_new) = level.add(points, |_, local| Moments::of_point(local));
+    let size = level.size();
+    for number in touched {
+        let (voxel, known) = level.voxel(number);
+        let birth = known.map_or(birth, |(_, birth)| *birth);
+        let shape = S::of(&voxel.tally(), voxel.middle(), size, sigma);
+        level.set_shape(number, shape.map(|shape| (shape, birth)));
+    }
+    n_new
+}
+
 /// Planes and lines around the sensor.
 #[derive(Clone, Debug)]
 pub(crate) struct LocalMap {
-    planes: Vec<Cells<Plane>>,
-    lines: Cells<Line>,
+    planes: Vec<Level<Plane>>,
+    lines: Level<Line>,
     sigma: f64,
     reach: f64,
     kept_at: Option<Vector3<f64>>,
@@ -118,9 +135,9 @@ impl LocalMap {
         let levels = 0..settings.n_levels as u32;
         Self {
             planes: levels
-                .map(|l| Cells::new(size(l), settings.memory))
+                .map(|l| VoxelMap::new(size(l), settings.memory))
                 .collect(),
-            lines: Cells::new(size(1), settings.memory),
+            lines: VoxelMap::new(size(1), settings.memory),
             sigma,
             reach: settings.reach,
             kept_at: None,
@@ -129,19 +146,19 @@ impl LocalMap {
 
     /// Number of planes on all levels.
     pub(crate) fn n_planes(&self) -> usize {
-        self.planes.iter().map(Cells::n_shapes).sum()
+        self.planes.iter().map(VoxelMap::n_shapes).sum()
     }
 
     /// The finest plane at a place, and when it was seen first.
     #[inline]
-    pub(crate) fn plane(&self, x: &Vector3<f64>) -> Option<(&Plane, u32)> {
-        self.planes.iter().find_map(|level| level.at(x))
+    pub(crate) fn plane(&self, x: &Vector3<f64>) -> Option<&(Plane, u32)> {
+        self.planes.iter().find_map(|level| level.at(&(*x).into()))
     }
 
     /// The line at a place.
     #[inline]
     pub(crate) fn line(&self, x: &Vector3<f64>) -> Option<&Line> {
-        self.lines.at(x).map(|(line, _)| line)
+        self.lines.at(&(*x).into()).map(|(line, _)| line)
     }
 
     /// Adds features in the map, new planes with a `birth`; returns the share of the planar ones that saw something new.
@@ -154,9 +171,9 @@ impl LocalMap {
         // On the finest level what is far away is always new.
         let told = 1.min(self.planes.len() - 1);
         let n_new: Vec<usize> = (self.planes.iter_mut())
-            .map(|level| level.insert(planar, self.sigma, birth))
+            .map(|level| add(level, planar, self.sigma, birth))
             .collect();
-        self.lines.insert(edges, self.sigma, birth);
+        add(&mut self.lines, edges, self.sigma, birth);
         n_new[told] as f64 / planar.len().max(1) as f64
     }
 

@@ -87,10 +87,9 @@ pub(crate) struct Mounts {
 
 impl Mounts {
     pub(crate) fn of(state: &State) -> Self {
-        let matrix = |q: &UnitQuaternion<f64>| q.to_rotation_matrix().into_inner();
         Self {
-            base: matrix(&state.base.R),
-            lidar: matrix(&state.lidar.R),
+            base: so3::matrix(&state.base.R),
+            lidar: so3::matrix(&state.lidar.R),
         }
     }
 }
@@ -107,16 +106,12 @@ pub(crate) fn place(
     let late = error[at::LATENCY];
     let turned =
         part(at::ROTATION) + moment.R * part(at::GYRO_BIAS) * moment.dt - moment.omega * late;
-    let R = (so3::exp(&turned) * moment.R)
-        .to_rotation_matrix()
-        .into_inner();
+    let R = so3::matrix(&(so3::exp(&turned) * moment.R));
     let p = moment.p + part(at::POSITION) - part(at::VELOCITY) * moment.dt - moment.v * late;
     let in_turned = mounts.lidar * feature.p;
     let rate = turning.rate_at(feature.time);
     let angle = feature.angle - rate * state.encoder_delay;
-    let turn = so3::exp(&(turning.axis * angle))
-        .to_rotation_matrix()
-        .into_inner();
+    let turn = so3::matrix(&so3::exp(&(turning.axis * angle)));
     let in_motor = turn * (in_turned + state.lidar.t);
     let in_base = mounts.base * in_motor;
     let lever = R * (in_base + state.base.t);

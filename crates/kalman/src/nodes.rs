@@ -2,7 +2,7 @@
 //! Predicted poses from the last update on, to which the points of a sweep belong.
 
 use bentwing_trajectory::so3;
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::Vector3;
 
 use crate::measure::Moment;
 use crate::state::{Mounted, State, Tangent, at};
@@ -63,8 +63,7 @@ pub(crate) fn correct(nodes: &mut [Node], from: f64, correction: &Tangent) {
             continue;
         }
         let share = (n.time - from) / (end - from);
-        let R = so3::exp(&(turn * share)) * n.pose.R;
-        n.pose.R = UnitQuaternion::new_normalize(R.into_inner());
+        n.pose.R = so3::turned(&(turn * share), &n.pose.R);
         n.pose.t += shift * share;
         n.v += change * share;
     }

@@ -2,7 +2,7 @@
 //! Prediction of state and covariance from one inertial sample to the next.
 
 use bentwing_trajectory::so3;
-use nalgebra::{Matrix3, SMatrix, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, SMatrix, Vector3};
 
 use crate::state::{DIM, Square, State, at};
 
@@ -66,13 +66,11 @@ pub(crate) fn step(
     let turn = (gyro - state.gyro_bias) * dt;
     let R = state.pose.R;
     // Over the step the force points where it does in the middle.
-    let middle = (R * so3::exp(&(0.5 * turn)))
-        .to_rotation_matrix()
-        .into_inner();
+    let middle = so3::matrix(&(R * so3::exp(&(0.5 * turn))));
     let force = middle * (accel - state.accel_bias);
     let a = force - state.gravity;
     let mut next = *state;
-    next.pose.R = UnitQuaternion::new_normalize((R * so3::exp(&turn)).into_inner());
+    next.pose.R = so3::renormalized(R * so3::exp(&turn));
     next.pose.t += state.v * dt + a * (0.5 * dt * dt);
     next.v += a * dt;
     (next, transition(&middle, &force, &state.gravity, dt))

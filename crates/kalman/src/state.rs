@@ -77,7 +77,7 @@ impl State {
     pub fn plus(&self, d: &Tangent) -> Self {
         let part = |i: usize| d.fixed_rows::<3>(i).into_owned();
         let moved = |m: &Mounted, r: usize, t: usize| Mounted {
-            R: renormalized(&(so3::exp(&part(r)) * m.R)),
+            R: so3::turned(&part(r), &m.R),
             t: m.t + part(t),
         };
         let turn = Vector3::new(d[at::GRAVITY], d[at::GRAVITY + 1], 0.0);
@@ -157,10 +157,6 @@ fn gravity_turn(from: &Vector3<f64>, to: &Vector3<f64>) -> Vector2<f64> {
         turn += Vector3::new(-left.y, left.x, 0.0) / now.z;
     }
     Vector2::new(turn.x, turn.y)
-}
-
-fn renormalized(q: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
-    UnitQuaternion::new_normalize(q.into_inner())
 }
 
 #[cfg(test)]

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The iterated update of the state by the features of a sweep.
 
-use bentwing_surfels::sym3;
 use bentwing_trajectory::so3;
+use bentwing_voxels::sym3;
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
 use crate::features::Feature;
@@ -245,7 +245,7 @@ fn sums(
             continue;
         }
         sums.n += 1;
-        sums.births.push(birth);
+        sums.births.push(*birth);
         sums.add(&placed.row(&plane.normal), e, s2, cauchy);
     }
     for (feature, moment) in seen.edges {

@@ -1,16 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The normal distribution of the surface in one voxel.
 
-use bentwing_surfels::{Moments, sym3};
+use bentwing_voxels::{MIN_POINTS, MIN_WIDTH, Moments, sym3};
 use nalgebra::{Matrix3, Vector3};
-
-/// A voxel with fewer points says nothing.
-const MIN_POINTS: u32 = 6;
-/// The middle standard deviation, in voxels, below which the points are one scan line: the surface
-/// is then free to turn about it. Along a surface points end where the voxel does or where the scan
-/// lines lay, and an edge of the voxel filled evenly has 0.29; so whatever is wider than this is no
-/// shape of the surface.
-const MIN_WIDTH: f64 = 0.07;
 
 /// Least cosine between the normal and the mean direction to the lidar. A single scan line that is bent,
 /// over a ridge or down a wall, spreads along the plane in which the lidar turned its beam, and that
@@ -84,14 +76,12 @@ mod tests {
         roughness: 0.02,
     };
 
-    fn moments(points: impl Iterator<Item = Vector3<f64>>) -> Option<Moments> {
-        points.fold(None, |sums, p| match sums {
-            None => Some(Moments::of_point(p.into(), 0.0, 0.0)),
-            Some(mut sums) => {
-                sums.add_point(p.into(), 0.0, 0.0);
-                Some(sums)
-            }
-        })
+    fn moments(points: impl Iterator<Item = Vector3<f64>>) -> Moments {
+        let mut sums = Moments::default();
+        for p in points {
+            sums.add_point(p.into());
+        }
+        sums
     }
 
     proptest! {
@@ -101,7 +91,7 @@ mod tests {
             let grid = (0..400).map(|i| R * Vector3::new(f64::from(i % 20) * 0.05 - 0.475, f64::from(i / 20) * 0.05 - 0.475, 0.0));
             let middle = Vector3::new(7.0, -3.0, 2.0);
             let facing = R * Vector3::new(0.9, 0.0, 0.3);
-            let found = moments(grid).and_then(|m| Gaussian::of(&m, &facing, &middle, 1.0, &SHAPE));
+            let found = Gaussian::of(&moments(grid), &facing, &middle, 1.0, &SHAPE);
             prop_assert!(found.is_some());
             if let Some(g) = found {
                 let n = R * Vector3::z();
@@ -127,7 +117,7 @@ mod tests {
             ) * 0.1
         });
         let (up, zero) = (Vector3::z(), Vector3::zeros());
-        let of = |m: Option<Moments>| m.and_then(|m| Gaussian::of(&m, &up, &zero, 1.0, &SHAPE));
+        let of = |m: Moments| Gaussian::of(&m, &up, &zero, 1.0, &SHAPE);
         assert!(of(moments(line)).is_none());
         assert!(of(moments(few)).is_none());
         assert!(of(moments(full)).is_none());
@@ -143,8 +133,7 @@ mod tests {
             })
         };
         let zero = Vector3::zeros();
-        let of =
-            |facing| moments(edge()).and_then(|m| Gaussian::of(&m, &facing, &zero, 1.0, &SHAPE));
+        let of = |facing| Gaussian::of(&moments(edge()), &facing, &zero, 1.0, &SHAPE);
         assert!(of(Vector3::new(0.2, 0.0, 0.98)).is_none());
         assert!(of(Vector3::new(0.0, 0.8, 0.6)).is_some());
     }

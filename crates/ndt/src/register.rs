@@ -2,7 +2,7 @@
 //! Registration of a scan: from coarse to fine, Gauss-Newton with Levenberg's damping.
 
 use bentwing_trajectory::so3;
-use nalgebra::{Isometry3, Matrix3, Matrix6, Translation3, UnitQuaternion, Vector6};
+use nalgebra::{Isometry3, Matrix3, Matrix6, Translation3, Vector6};
 use thiserror::Error;
 
 use crate::reference::Reference;
@@ -233,12 +233,9 @@ fn is_short(step: &Vector6<f64>, (angle, length): (f64, f64)) -> bool {
 
 /// `R ← Exp(δr) R`, `p ← p + δt`.
 pub(crate) fn moved(pose: &Isometry3<f64>, step: &Vector6<f64>) -> Isometry3<f64> {
-    let turned = so3::exp(&step.fixed_rows::<3>(0).into_owned()) * pose.rotation;
+    let turned = so3::turned(&step.fixed_rows::<3>(0).into_owned(), &pose.rotation);
     let shifted = pose.translation.vector + step.fixed_rows::<3>(3);
-    Isometry3::from_parts(
-        Translation3::from(shifted),
-        UnitQuaternion::new_normalize(turned.into_inner()),
-    )
+    Isometry3::from_parts(Translation3::from(shifted), turned)
 }
 
 /// The damped Gauss-Newton step.

@@ -82,7 +82,7 @@ pub(crate) fn score(
     T_map_scan: &Isometry3<f64>,
     scale: &Scale,
 ) -> Sums {
-    let R = T_map_scan.rotation.to_rotation_matrix().into_inner();
+    let R = so3::matrix(&T_map_scan.rotation);
     let t = T_map_scan.translation.vector;
     let chunks = points.par_chunks(CHUNK);
     let parts: Vec<Sums> = chunks

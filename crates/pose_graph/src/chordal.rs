@@ -7,8 +7,9 @@
 //! Both systems have a block of three for each node: the rows of a rotation obey the same equations,
 //! and so are three right sides.
 
+use bentwing_trajectory::so3;
 use faer::Mat;
-use nalgebra::{Isometry3, Matrix3, Rotation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, UnitQuaternion, Vector3};
 
 use crate::GraphError;
 use crate::blocks::{BlockMatrix, Structure};
@@ -62,10 +63,10 @@ impl<'a> Relaxation<'a> {
         self.begin(3);
         for (link, &weight) in self.graph.links.iter().zip(weights) {
             let kappa = weight * link.information.fixed_view::<3, 3>(0, 0).trace() / 3.0;
-            let turn = link.T_from_to.rotation.to_rotation_matrix().into_inner();
+            let turn = so3::matrix(&link.T_from_to.rotation);
             let from = link.from.map(|from| self.graph.poses[from].rotation);
             let known = [from.unwrap_or_default(), self.graph.poses[link.to].rotation]
-                .map(|R| R.to_rotation_matrix().into_inner().transpose());
+                .map(|R| so3::matrix(&R).transpose());
             self.join(
                 link,
                 &(Matrix3::identity() * kappa),
@@ -103,9 +104,7 @@ impl<'a> Relaxation<'a> {
             let R_from = link
                 .from
                 .map_or_else(UnitQuaternion::identity, |from| rotations[from]);
-            let R = (R_from * link.T_from_to.rotation)
-                .to_rotation_matrix()
-                .into_inner();
+            let R = so3::matrix(&(R_from * link.T_from_to.rotation));
             let measured = link.information.fixed_view::<3, 3>(3, 3) * weight;
             let information = R * measured * R.transpose();
             let way = R_from * link.T_from_to.translation.vector;
@@ -194,7 +193,7 @@ fn nearest_rotation(matrix: &Matrix3<f64>) -> UnitQuaternion<f64> {
     };
     let sign = (U.determinant() * V_t.determinant()).signum();
     let R = U * Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, sign)) * V_t;
-    UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(R))
+    so3::of_matrix(R)
 }
 
 #[cfg(test)]

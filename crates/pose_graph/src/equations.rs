@@ -45,6 +45,20 @@ pub fn cost(
     }
 }
 
+/// Of two sets of poses the one that costs less.
+///
+/// # Errors
+/// When a cost is not finite.
+pub fn cheaper(
+    graph: &PoseGraph,
+    given: &[Isometry3<f64>],
+    relaxed: Vec<Isometry3<f64>>,
+    weights: &[f64],
+) -> Result<Vec<Isometry3<f64>>, GraphError> {
+    let better = cost(graph, &relaxed, weights)? < cost(graph, given, weights)?;
+    Ok(if better { relaxed } else { given.to_vec() })
+}
+
 /// `JᵀΩJ` and `JᵀΩr` of all terms.
 pub struct Equations<'a> {
     /// The matrix, by unknowns.

@@ -78,7 +78,7 @@ pub fn squared(r: &Vector6<f64>, covariance: &Matrix6<f64>) -> f64 {
 
 /// Of a tangent vector in the frame of the end, that in the frame of the start.
 fn adjoint(T: &Isometry3<f64>) -> Matrix6<f64> {
-    let R = T.rotation.to_rotation_matrix().into_inner();
+    let R = so3::matrix(&T.rotation);
     let mut adjoint = Matrix6::zeros();
     adjoint.fixed_view_mut::<3, 3>(0, 0).copy_from(&R);
     adjoint.fixed_view_mut::<3, 3>(3, 3).copy_from(&R);

@@ -2,7 +2,7 @@
 //! Poses as unknowns: the numbering of those that are free, and their correction.
 
 use bentwing_trajectory::so3;
-use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Vector3};
 
 use crate::graph::PoseGraph;
 
@@ -20,8 +20,7 @@ pub fn numbered(graph: &PoseGraph) -> Vec<Option<usize>> {
 
 /// `R ← Exp(δr) R`, `p ← p + δt` with `delta = [δr, δt]`.
 pub fn correct(pose: &mut Isometry3<f64>, delta: &[f64]) {
-    let turned = so3::exp(&Vector3::from_column_slice(&delta[..3])) * pose.rotation;
-    pose.rotation = UnitQuaternion::new_normalize(turned.into_inner());
+    pose.rotation = so3::turned(&Vector3::from_column_slice(&delta[..3]), &pose.rotation);
     pose.translation.vector += Vector3::from_column_slice(&delta[3..6]);
 }
 

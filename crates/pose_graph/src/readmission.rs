@@ -11,11 +11,10 @@ use crate::GraphError;
 use crate::calibration::calibrated;
 use crate::chordal::Relaxation;
 use crate::dogleg::{Minimizer, Minimum, Stop};
-use crate::equations::structure;
+use crate::equations::{cheaper, structure};
 use crate::graph::{PoseGraph, held};
 use crate::motion::{Motion, squared};
 use crate::robust::{Residuals, Robust, anneal, narrow};
-use crate::solve::cheaper;
 use crate::terms::LinkAt;
 use crate::voting::supported;
 

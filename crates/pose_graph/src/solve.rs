@@ -6,7 +6,7 @@ use nalgebra::Isometry3;
 use crate::GraphError;
 use crate::chordal::Relaxation;
 use crate::dogleg::{Minimizer, Minimum, Stop};
-use crate::equations::{chi2s, cost, structure};
+use crate::equations::{cheaper, chi2s, cost, structure};
 use crate::graph::PoseGraph;
 use crate::poses::numbered;
 use crate::readmission;
@@ -83,17 +83,6 @@ fn minimum(
     let relaxed = Relaxation::new(graph, numbers, &every)?.poses(&all)?;
     let start = cheaper(graph, &graph.poses, relaxed, &all)?;
     Ok((minimizer.minimize(start, &all, stop)?, all))
-}
-
-/// Of two sets of poses the one that costs less.
-pub fn cheaper(
-    graph: &PoseGraph,
-    given: &[Isometry3<f64>],
-    relaxed: Vec<Isometry3<f64>>,
-    weights: &[f64],
-) -> Result<Vec<Isometry3<f64>>, GraphError> {
-    let better = cost(graph, &relaxed, weights)? < cost(graph, given, weights)?;
-    Ok(if better { relaxed } else { given.to_vec() })
 }
 
 /// The error with the node of the unknown that the factorization named.

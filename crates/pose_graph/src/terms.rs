@@ -78,7 +78,7 @@ impl LinkAt {
 
     fn jacobian_of_to(&self, link: &Link, poses: &[Isometry3<f64>]) -> Matrix6<f64> {
         // Both perturbations of `to` act in its own frame after the turn by R_toᵀ.
-        let R = poses[link.to].rotation.to_rotation_matrix().into_inner();
+        let R = so3::matrix(&poses[link.to].rotation);
         let mut turn = Matrix6::zeros();
         turn.fixed_view_mut::<3, 3>(0, 0).copy_from(&R.transpose());
         turn.fixed_view_mut::<3, 3>(3, 3).copy_from(&R.transpose());

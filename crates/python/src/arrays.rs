@@ -135,6 +135,11 @@ pub(crate) fn unit_quaternion(name: &str, q: &[f64; 4]) -> PyResult<UnitQuaterni
     Ok(UnitQuaternion::new_normalize(q))
 }
 
+/// A quaternion as x, y, z, w.
+pub(crate) fn xyzw(q: &UnitQuaternion<f64>) -> [f64; 4] {
+    [q.i, q.j, q.k, q.w]
+}
+
 /// An (N, D) array from rows.
 pub(crate) fn to_array2<'py, const D: usize>(
     py: Python<'py>,

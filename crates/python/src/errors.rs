@@ -70,7 +70,9 @@ pub(crate) fn kalman_error(py: Python<'_>, error: &KalmanError) -> PyErr {
 
 /// An exception of `bentwing.base.errors`.
 fn raised(py: Python<'_>, name: &str, message: &str) -> PyErr {
-    let class = py.import("bentwing.base.errors").and_then(|m| m.getattr(name));
+    let class = py
+        .import("bentwing.base.errors")
+        .and_then(|m| m.getattr(name));
     match class.and_then(|c| c.call1((message,))) {
         Ok(exception) => PyErr::from_value(exception),
         Err(failed) => failed,

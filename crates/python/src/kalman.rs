@@ -11,7 +11,7 @@ use pyo3::prelude::*;
 
 use crate::arrays::{
     angles as checked_angles, finite_number, finite_rows, finite_vector, times as checked_times,
-    to_array2, unit_quaternion, vectors,
+    to_array2, unit_quaternion, vectors, xyzw,
 };
 use crate::errors::{detached, kalman_error};
 
@@ -126,7 +126,7 @@ fn mounted(name: &str, (t, q): &Transform) -> PyResult<Mounted> {
 }
 
 fn transform(m: &Mounted) -> Transform {
-    (m.t.into(), [m.R.i, m.R.j, m.R.k, m.R.w])
+    (m.t.into(), xyzw(&m.R))
 }
 
 /// The filter.

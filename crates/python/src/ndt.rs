@@ -4,11 +4,11 @@
 use bentwing_ndt as core;
 use bentwing_ndt::{Expectation, NdtError};
 use nalgebra::{Isometry3, Matrix3, Translation3};
-use numpy::{IntoPyArray, PyArray1, PyReadonlyArray2};
+use numpy::{IntoPyArray, PyArray1, PyReadonlyArray2, ToPyArray};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::arrays::{finite_number, finite_rows, finite_vector, unit_quaternion};
+use crate::arrays::{finite_number, finite_rows, finite_vector, unit_quaternion, xyzw};
 use crate::errors::{in_pool, ndt_error};
 
 type Transform = ([f64; 3], [f64; 4]);
@@ -137,8 +137,7 @@ impl NdtRegistration {
     /// Rotation (4,) of the scan, x y z w.
     #[getter]
     fn quat_xyzw<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        let q = &self.0.pose.rotation;
-        vec![q.i, q.j, q.k, q.w].into_pyarray(py)
+        xyzw(&self.0.pose.rotation).to_pyarray(py)
     }
 
     /// Points in voxels with a distribution.
@@ -192,7 +191,7 @@ impl NdtRegistration {
 
 fn shares(information: &Matrix3<f64>) -> [f64; 3] {
     let sum = information.trace().max(f64::MIN_POSITIVE);
-    bentwing_surfels::sym3::eigen(&(information / sum)).values
+    bentwing_voxels::sym3::eigen(&(information / sum)).values
 }
 
 /// Indices of some points, evenly in space: the first in each voxel, and evenly chosen ones of these
@@ -208,7 +207,7 @@ pub(crate) fn thin_points<'py>(
     let points = finite_rows("points", &points)?;
     let spacing = positive("spacing", finite_number("spacing", spacing)?)?;
     Ok(
-        crate::errors::detached(py, || bentwing_surfels::thin(points, spacing, most))
+        crate::errors::detached(py, || bentwing_voxels::thin(points, spacing, most))
             .into_pyarray(py),
     )
 }

@@ -11,7 +11,7 @@ use numpy::{
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::arrays::{finite, finite_rows, rows, to_array2, unit_quaternion};
+use crate::arrays::{finite, finite_rows, rows, to_array2, unit_quaternion, xyzw};
 use crate::errors::{detached, graph_error};
 
 /// Node that stands for the map: a link from there is a prior.
@@ -62,8 +62,8 @@ impl PoseGraphSolution {
     /// Rotations (N, 4) as unit quaternions x, y, z, w.
     #[getter]
     fn quats_xyzw<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let poses = self.0.poses.iter().map(|T| T.rotation);
-        let rows: Vec<[f64; 4]> = poses.map(|q| [q.i, q.j, q.k, q.w]).collect();
+        let poses = self.0.poses.iter().map(|T| &T.rotation);
+        let rows: Vec<[f64; 4]> = poses.map(xyzw).collect();
         to_array2(py, &rows)
     }
 

@@ -8,7 +8,8 @@ use bentwing_registration::{FixedView as RustView, GlobalPrior, Initial, N_GLOBA
 use bentwing_surfels::{Points, SurfelSet};
 use nalgebra::Matrix3;
 use numpy::{
-    PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods, ToPyArray,
+    PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2,
+    PyUntypedArrayMethods, ToPyArray,
 };
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -16,7 +17,7 @@ use pyo3::prelude::*;
 use crate::arrays::{
     angles as angles_of, finite, finite_number, finite_rows, times, to_array2, vectors,
 };
-use crate::errors::{in_pool, solve_error};
+use crate::errors::{detached, in_pool, solve_error};
 use crate::trajectory::{Globals, Imu, Samples};
 
 #[derive(FromPyObject)]
@@ -328,6 +329,15 @@ impl Registration {
         to_array2(py, &rows)
     }
 
+    /// Covariances (N, 6, 6) of the correction of each sample, computed when they are asked for.
+    ///
+    /// Rotation first, rad and m, perturbed on the left in the map frame.
+    fn sample_covariances<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        let found = detached(py, || self.0.sample_covariances());
+        let flat: Vec<f64> = found.iter().flat_map(|c| c.iter().copied()).collect();
+        flat.to_pyarray(py).reshape([found.len(), 6, 6])
+    }
+
     /// Correction (20,) that leads from the prior's mean to `globals`.
     #[getter]
     fn offset(&self) -> [f64; N_GLOBALS] {
@@ -381,7 +391,7 @@ impl Registration {
     /// Direction (3,) in the map in which the matches say least about the translation.
     #[getter]
     fn weakest_direction(&self) -> [f64; 3] {
-        bentwing_surfels::sym3::eigen(&self.0.health.translation)
+        bentwing_voxels::sym3::eigen(&self.0.health.translation)
             .normal
             .into()
     }
@@ -406,7 +416,7 @@ impl Registration {
 }
 
 fn eigenvalues(sum: &Matrix3<f64>, weight: f64) -> [f64; 3] {
-    bentwing_surfels::sym3::eigen(&(sum / weight.max(f64::MIN_POSITIVE))).values
+    bentwing_voxels::sym3::eigen(&(sum / weight.max(f64::MIN_POSITIVE))).values
 }
 
 /// A finite (20, 20) array as a matrix over the slow states.

@@ -15,7 +15,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::arrays::{
-    finite_number, finite_rows, finite_vector, times, to_array2, unit_quaternion, vectors,
+    finite_number, finite_rows, finite_vector, times, to_array2, unit_quaternion, vectors, xyzw,
 };
 use crate::errors::in_pool;
 
@@ -102,12 +102,7 @@ impl Samples {
     /// Rotations (N, 4) as unit quaternions x, y, z, w.
     #[getter]
     fn quats_xyzw<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let rows: Vec<[f64; 4]> = self
-            .0
-            .rotations()
-            .iter()
-            .map(|q| [q.i, q.j, q.k, q.w])
-            .collect();
+        let rows: Vec<[f64; 4]> = self.0.rotations().iter().map(xyzw).collect();
         to_array2(py, &rows)
     }
 
@@ -449,5 +444,5 @@ fn vector<'py>(py: Python<'py>, v: &Vector3<f64>) -> Bound<'py, PyArray1<f64>> {
 }
 
 fn quaternion<'py>(py: Python<'py>, q: &UnitQuaternion<f64>) -> Bound<'py, PyArray1<f64>> {
-    [q.i, q.j, q.k, q.w].to_pyarray(py)
+    xyzw(q).to_pyarray(py)
 }

@@ -4,10 +4,12 @@
 use bentwing_trajectory::{Head, so3};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
-use crate::{GlobalMatrix, GlobalVector};
-
 /// Number of global states.
 pub const N_GLOBALS: usize = 20;
+/// A vector of all global states or their corrections.
+pub type GlobalVector = [f64; N_GLOBALS];
+/// A matrix over all global states.
+pub type GlobalMatrix = nalgebra::SMatrix<f64, N_GLOBALS, N_GLOBALS>;
 
 /// Where each global state stands in a [`GlobalVector`].
 pub mod index {
@@ -53,7 +55,7 @@ impl Globals {
         let head = &mut self.head;
         head.latency += delta[index::LATENCY];
         let base = &mut head.T_imu_base;
-        base.rotation = renormalized(so3::exp(&three(index::EXTRINSIC_ROTATION)) * base.rotation);
+        base.rotation = so3::turned(&three(index::EXTRINSIC_ROTATION), &base.rotation);
         base.translation =
             Translation3::from(base.translation.vector + three(index::EXTRINSIC_TRANSLATION));
         self.gyro_bias += three(index::GYRO_BIAS);
@@ -65,7 +67,7 @@ impl Globals {
             let [u, v] = so3::orthogonal_pair(&motor.axis);
             let pair = |r: std::ops::Range<usize>| u * delta[r.start] + v * delta[r.start + 1];
             let lidar = &mut motor.T_motor_lidar;
-            lidar.rotation = renormalized(so3::exp(&pair(index::MOTOR_TILT)) * lidar.rotation);
+            lidar.rotation = so3::turned(&pair(index::MOTOR_TILT), &lidar.rotation);
             lidar.translation =
                 Translation3::from(lidar.translation.vector + pair(index::MOTOR_OFFSET));
         }
@@ -117,10 +119,6 @@ fn turn_about_x_and_y(from: &Vector3<f64>, to: &Vector3<f64>) -> Vector3<f64> {
         found += Vector3::new(step.x, step.y, 0.0);
     }
     found
-}
-
-fn renormalized(q: UnitQuaternion<f64>) -> UnitQuaternion<f64> {
-    UnitQuaternion::new_normalize(q.into_inner())
 }
 
 /// What is known of the global states before a registration.

@@ -9,6 +9,10 @@ use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
 use crate::Globals;
+use crate::neighbors::Grid;
+
+/// Features are searched within cells of this size, in voxels.
+const CELL: f32 = 1.0;
 
 /// Least surfels per parallel task.
 const SURFELS_PER_TASK: usize = 256;
@@ -85,6 +89,20 @@ impl Placed {
     pub fn level(&self, level: usize) -> std::ops::Range<usize> {
         self.level_starts[level]..self.level_starts[level + 1]
     }
+}
+
+/// The search grid of placed surfels of one level.
+pub fn grid_of(surfels: &[PlacedSurfel], voxel_size: f64) -> Grid {
+    let positions: Vec<[f32; 3]> = surfels
+        .iter()
+        .map(|s| (s.mean / voxel_size).cast::<f32>().into())
+        .collect();
+    let normals: Vec<[f32; 3]> = surfels
+        .iter()
+        .map(|s| s.normal.cast::<f32>().into())
+        .collect();
+    let times: Vec<f64> = surfels.iter().map(|s| s.time).collect();
+    Grid::new(&positions, &normals, &times, CELL)
 }
 
 /// Places surfel `i` of `set`; its basis is left to the caller.

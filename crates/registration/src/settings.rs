@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Settings of a registration; their defaults live in the Python package.
 
+use crate::neighbors::Search;
+
 /// Noise of one inertial sample of the trajectory's rate: density × √rate.
 #[derive(Clone, Copy, Debug)]
 pub struct ImuNoise {
@@ -45,4 +47,24 @@ pub struct Settings {
     pub motion_accel_density: f64,
     /// Density of the angular acceleration that is expected without an IMU, rad/s²/√Hz.
     pub motion_angular_density: f64,
+}
+
+impl Settings {
+    /// The search for matches.
+    pub fn search(&self) -> Search {
+        Search {
+            k: self.n_neighbors,
+            max_distance: self.max_match_distance as f32,
+            min_time_gap: self.min_match_gap as f32,
+        }
+    }
+
+    /// Scale of the Cauchy weight in an outer iteration.
+    pub(crate) fn cauchy_scale_at(&self, n_outer: usize) -> f64 {
+        if n_outer == 0 {
+            self.first_cauchy_scale
+        } else {
+            self.cauchy_scale
+        }
+    }
 }

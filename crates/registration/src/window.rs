@@ -1,19 +1,27 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The registration: the paper on one screen.
 
+mod fixed_view;
+mod matches;
+mod posterior;
+
 use std::sync::Arc;
 
 use bentwing_surfels::SurfelSet;
 use bentwing_trajectory::{CorrectionSpline, Imu, Trajectory};
+use nalgebra::Matrix6;
 
-use crate::constraints::{imu, initial, motion, prior, velocity};
-use crate::matches::{self, MatchRows};
-use crate::placed::Placed;
-use crate::response::{self, PoseResponse};
-use crate::solve::{Factorized, Marginals, Solution, SolveError, Solver};
-use crate::step::{self, StepSize};
+pub use fixed_view::FixedView;
+use matches::MatchRows;
+pub use posterior::Posterior;
+
+use crate::constraints::initial;
+use crate::state::{State, StepSize};
+use crate::system::response;
+use crate::system::solve::Factorized;
 use crate::{
-    FixedView, GlobalMatrix, GlobalPrior, GlobalVector, Globals, Health, NormalEquations, Settings,
+    GlobalMatrix, GlobalPrior, GlobalVector, Globals, Health, NormalEquations, PoseResponse,
+    Settings, Solution, SolveError, Solver,
 };
 
 /// How the start of the trajectory is held.
@@ -70,6 +78,40 @@ pub struct Registration {
     pub converged: bool,
     /// Samples of the trajectory without inertial data.
     pub n_blind: usize,
+    /// The last equations.
+    pub posterior: Posterior,
+}
+
+impl Registration {
+    /// Marginal covariance of the correction `[δr, δt]` of each sample.
+    pub fn sample_covariances(&self) -> Vec<Matrix6<f64>> {
+        self.posterior.at_samples(&self.trajectory)
+    }
+}
+
+impl Problem<'_> {
+    fn state(&self, settings: &Settings) -> State<'_> {
+        State::new(
+            &self.trajectory,
+            &self.globals,
+            self.prior,
+            self.imu,
+            settings,
+        )
+    }
+
+    /// How the first pose is held, if it is an unknown.
+    fn first_pose(&self) -> Option<&'static initial::Sigmas> {
+        (self.initial == Initial::FirstPose).then_some(&initial::HELD)
+    }
+
+    /// How the control points that join the past follow the calibration.
+    fn ties(&self, spline: &CorrectionSpline) -> Vec<PoseResponse> {
+        match self.initial {
+            Initial::FirstPose => Vec::new(),
+            Initial::Joined => response::joined(self.responses, &self.trajectory, spline).to_vec(),
+        }
+    }
 }
 
 /// Corrects a trajectory and its calibration (Kaul 2015, section 2.1).
@@ -80,146 +122,121 @@ pub fn register_window(
     problem: &Problem<'_>,
     settings: &Settings,
 ) -> Result<Registration, SolveError> {
-    let mut state = State::new(problem, settings);
-    let ties = state.ties(problem);
-    let mut solver = Solver::default();
+    let mut state = problem.state(settings);
+    let ties = problem.ties(&state.spline);
+    let (mut solver, mut matches) = (Solver::default(), Vec::new());
     let (mut step_size, mut n_outer) = (StepSize::UNKNOWN, 0);
-    let (mut matches, mut last) = (Vec::new(), None);
-    while n_outer < settings.max_outer && !step_size.converged(settings) {
-        let placed = Placed::new(
-            problem.sets,
-            &state.trajectory,
-            &state.globals,
-            &state.spline,
-        );
+    loop {
+        let placed = state.place(problem.sets);
         if step_size.moves_matches() {
             matches = matches::find(&placed, problem.views, settings);
         }
-        let fixed_rows = state.fixed_rows(problem, settings);
-        let rows = MatchRows::new(&placed, problem.views, &state.globals, &mut matches);
-        let scale = if n_outer == 0 {
-            settings.first_cauchy_scale
-        } else {
-            settings.cauchy_scale
+        let weighing = Weighing {
+            fixed_rows: state.fixed_rows(problem.first_pose(), settings),
+            matches: MatchRows::new(&placed, problem.views, &state.globals, &mut matches),
+            scale: settings.cauchy_scale_at(n_outer),
+            n_inner: settings.n_inner,
         };
-        let mut step = None;
-        for _ in 0..settings.n_inner {
-            let mut equations = fixed_rows.clone();
-            let health = rows.add(&mut equations, step.as_ref(), scale);
-            response::tie(&mut equations, &ties);
-            let factorized = solver.factorize(&equations, ties.len(), &problem.prior.frozen)?;
-            response::complete(step.insert(factorized.solve()), &ties);
-            last = Some((factorized, health, placed.surfels.len()));
-        }
-        if let Some(step) = step {
-            step_size = state.apply(&step)?;
-        }
+        let last = weighing.solve(&mut solver, &ties, problem.prior)?;
+        step_size = state.apply(&last.step)?;
         n_outer += 1;
+        let converged = step_size.converged(settings);
+        if converged || n_outer >= settings.max_outer {
+            let n_surfels = placed.surfels.len();
+            return Ok(last.result(state, ties, n_surfels, n_outer, converged));
+        }
     }
-    Ok(state.finish(last, &ties, n_outer, step_size.converged(settings)))
 }
 
 /// The normal equations of the first iteration, for those who study how to solve them.
 pub fn first_equations(problem: &Problem<'_>, settings: &Settings) -> NormalEquations {
-    let mut state = State::new(problem, settings);
-    let (trajectory, globals) = (&state.trajectory, &state.globals);
-    let placed = Placed::new(problem.sets, trajectory, globals, &state.spline);
+    let mut state = problem.state(settings);
+    let placed = state.place(problem.sets);
     let mut matches = matches::find(&placed, problem.views, settings);
-    let mut equations = state.fixed_rows(problem, settings);
+    let mut equations = state.fixed_rows(problem.first_pose(), settings);
     let rows = MatchRows::new(&placed, problem.views, &state.globals, &mut matches);
-    rows.add(&mut equations, None, settings.first_cauchy_scale);
+    rows.add(&mut equations, None, settings.cauchy_scale_at(0));
     equations
 }
 
-/// What changes from iteration to iteration.
-struct State {
-    trajectory: Trajectory,
-    globals: Globals,
-    spline: CorrectionSpline,
-    /// How far the global states have come from the prior's mean.
-    moved: GlobalVector,
-    n_blind: usize,
+/// An outer iteration: rows that stay while the matches are weighed.
+struct Weighing<'a> {
+    fixed_rows: NormalEquations,
+    matches: MatchRows<'a>,
+    scale: f64,
+    n_inner: usize,
 }
 
-impl State {
-    fn new(problem: &Problem<'_>, settings: &Settings) -> Self {
-        let trajectory = problem.trajectory.clone();
-        let (start, end) = (trajectory.start(), trajectory.end());
-        Self {
-            spline: CorrectionSpline::covering(start, end, settings.knot_interval),
-            trajectory,
-            globals: problem.globals.clone(),
-            moved: problem.prior.offset,
-            n_blind: 0,
-        }
-    }
-
-    /// How the control points that join the past follow the calibration.
-    fn ties(&self, problem: &Problem<'_>) -> Vec<PoseResponse> {
-        match problem.initial {
-            Initial::FirstPose => Vec::new(),
-            Initial::Joined => {
-                response::joined(problem.responses, &self.trajectory, &self.spline).to_vec()
-            }
-        }
-    }
-
-    /// The rows whose weights do not change in the inner iterations.
-    fn fixed_rows(&mut self, problem: &Problem<'_>, settings: &Settings) -> NormalEquations {
-        let mut equations = NormalEquations::new(self.spline.n_controls());
-        velocity::add(&mut equations, &self.spline, settings);
-        prior::add(&mut equations, &problem.prior.information, &self.moved);
-        if problem.initial == Initial::FirstPose {
-            let start = self.trajectory.start();
-            initial::add(&mut equations, &self.spline, start, &initial::HELD);
-        }
-        match problem.imu {
-            Some(samples) => {
-                let noise = &settings.imu_noise;
-                let (t, g, s) = (&self.trajectory, &self.globals, &self.spline);
-                self.n_blind = imu::add(&mut equations, t, samples, g, s, noise);
-            }
-            None => motion::add(&mut equations, &self.trajectory, &self.spline, settings),
-        }
-        equations
-    }
-
-    /// Composes a step into the state; returns how large it was.
-    fn apply(&mut self, step: &Solution) -> Result<StepSize, SolveError> {
-        let (trajectory, globals) = (&mut self.trajectory, &mut self.globals);
-        let size = step::compose(step, trajectory, globals, &self.spline)?;
-        for (m, d) in self.moved.iter_mut().zip(step.globals) {
-            *m += d;
-        }
-        Ok(size)
-    }
-
-    fn finish(
-        self,
-        last: Option<(Factorized, Health, usize)>,
+impl Weighing<'_> {
+    /// Weighs the matches by what the last solution leaves of them, and solves; several times.
+    fn solve(
+        &self,
+        solver: &mut Solver,
         ties: &[PoseResponse],
+        prior: &GlobalPrior,
+    ) -> Result<Solved, SolveError> {
+        let mut solved: Option<Solved> = None;
+        for _ in 1..self.n_inner {
+            solved = Some(self.solve_once(solved.as_ref(), solver, ties, prior)?);
+        }
+        self.solve_once(solved.as_ref(), solver, ties, prior)
+    }
+
+    fn solve_once(
+        &self,
+        before: Option<&Solved>,
+        solver: &mut Solver,
+        ties: &[PoseResponse],
+        prior: &GlobalPrior,
+    ) -> Result<Solved, SolveError> {
+        let mut equations = self.fixed_rows.clone();
+        let step = before.map(|s| &s.step);
+        let health = self.matches.add(&mut equations, step, self.scale);
+        response::tie(&mut equations, ties);
+        let factorized = solver.factorize(&equations, ties.len(), &prior.frozen)?;
+        let mut step = factorized.solve();
+        step.complete(ties);
+        Ok(Solved {
+            factorized,
+            step,
+            health,
+        })
+    }
+}
+
+/// What an inner iteration found.
+struct Solved {
+    factorized: Factorized,
+    step: Solution,
+    health: Health,
+}
+
+impl Solved {
+    fn result(
+        self,
+        state: State<'_>,
+        ties: Vec<PoseResponse>,
+        n_surfels: usize,
         n_outer: usize,
         converged: bool,
     ) -> Registration {
-        let (marginals, health, n_surfels) = match last {
-            Some((f, health, n)) => (f.marginals(ties), health, n),
-            None => (
-                Marginals::unknown(self.spline.n_controls()),
-                Health::default(),
-                0,
-            ),
-        };
+        let marginals = self.factorized.marginals(&ties);
         Registration {
-            responses: response::at_samples(&marginals.responses, &self.trajectory, &self.spline),
-            trajectory: self.trajectory,
-            globals: self.globals,
+            responses: response::at_samples(&marginals.responses, &state.trajectory, &state.spline),
+            trajectory: state.trajectory,
+            globals: state.globals,
             covariance: marginals.covariance,
-            offset: self.moved,
-            health,
+            offset: state.moved,
+            health: self.health,
             n_surfels,
             n_outer,
             converged,
-            n_blind: self.n_blind,
+            n_blind: state.n_blind,
+            posterior: Posterior {
+                factorized: self.factorized,
+                ties,
+                spline: state.spline,
+            },
         }
     }
 }

@@ -7,17 +7,14 @@
 )]
 
 use bentwing_trajectory::{Head, Trajectory};
+use bentwing_voxels::{VoxelKey, sym3};
 use nalgebra::{Matrix3, Vector3};
 use pulp::{Arch, Simd, WithSimd};
 use rustc_hash::FxHashMap;
 
+use crate::SurfelSet;
+use crate::passage::Passage;
 use crate::place::Placer;
-use crate::{Moments, SurfelSet, sym3};
-
-/// Bits per voxel coordinate in a packed key; enough for ±400 km at 0.4 m.
-const KEY_BITS: u32 = 21;
-const KEY_OFFSET: i64 = 1 << (KEY_BITS - 1);
-const KEY_MASK: u64 = (1 << KEY_BITS) - 1;
 
 /// Points that are placed before they are merged.
 const BLOCK: usize = 1 << 14;
@@ -68,10 +65,10 @@ pub struct Points<'a> {
     pub angles: &'a [f64],
 }
 
-/// Points of one voxel seen in one go.
+/// What was seen of one voxel in one go.
 struct Cell {
-    key: u64,
-    moments: Moments,
+    key: VoxelKey,
+    passage: Passage,
 }
 
 /// Extracts the surfels of all levels from points placed with `trajectory` (Kaul 2015, 2.1).
@@ -92,7 +89,7 @@ pub fn extract(
         if level > 0 {
             let mut merger = Merger::new(settings);
             for cell in &cells {
-                merger.add(coarser(cell.key), &cell.moments);
+                merger.add(cell.key.coarser(), &cell.passage);
             }
             cells = merger.merged;
         }
@@ -100,7 +97,7 @@ pub fn extract(
         for cell in &cells {
             if push_surfel(
                 &mut set,
-                &cell.moments,
+                &cell.passage,
                 &origin,
                 size,
                 trajectory,
@@ -150,8 +147,8 @@ fn limit(set: SurfelSet, ranks: &[u64], budget: usize) -> SurfelSet {
 }
 
 /// A fixed pseudo-random number for each voxel (the finalizer of `SplitMix64`).
-fn rank(key: u64, level: usize) -> u64 {
-    let mut x = key ^ (level as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+fn rank(key: VoxelKey, level: usize) -> u64 {
+    let mut x = key.bits() ^ (level as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15);
     x = (x ^ (x >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
     x = (x ^ (x >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
     x ^ (x >> 31)
@@ -167,7 +164,7 @@ fn cells_of(
 ) -> Vec<Cell> {
     let arch = Arch::new();
     let mut placed = vec![[0.0; 3]; BLOCK.min(points.points.len())];
-    let mut keys = vec![0; placed.len()];
+    let mut keys = vec![VoxelKey::NONE; placed.len()];
     let mut merger = Merger::new(settings);
     for first in (0..points.points.len()).step_by(BLOCK) {
         let block = first..(first + BLOCK).min(points.points.len());
@@ -187,7 +184,7 @@ fn cells_of(
         for (i, (p, &key)) in block.zip(placed.iter().zip(keys.iter())) {
             let angle = points.angles.get(i).copied().unwrap_or(0.0);
             let local = [p[0] - origin.x, p[1] - origin.y, p[2] - origin.z];
-            merger.add_point(key, local, points.stamps[i], angle);
+            merger.add(key, &Passage::of_point(local, points.stamps[i], angle));
         }
     }
     merger.merged
@@ -200,9 +197,9 @@ struct Merger<'a> {
     settings: &'a Settings,
     merged: Vec<Cell>,
     /// Where the latest cell of each voxel is.
-    open: FxHashMap<u64, usize>,
+    open: FxHashMap<VoxelKey, usize>,
     /// The same for some voxels, in the place that their keys' hashes give them.
-    recent: Vec<(u64, usize)>,
+    recent: Vec<(VoxelKey, usize)>,
 }
 
 impl<'a> Merger<'a> {
@@ -211,49 +208,35 @@ impl<'a> Merger<'a> {
             settings,
             merged: Vec::new(),
             open: FxHashMap::default(),
-            // Of no voxel: keys have 63 bits.
-            recent: vec![(u64::MAX, 0); 1 << RECENT_BITS],
+            recent: vec![(VoxelKey::NONE, 0); 1 << RECENT_BITS],
         }
     }
 
     #[inline]
-    fn add_point(&mut self, key: u64, p: [f64; 3], time: f64, angle: f64) {
-        match self.cell_for(key, (time, time)) {
-            Some(moments) => moments.add_point(p, time, angle),
-            None => self.push(key, Moments::of_point(p, time, angle)),
-        }
-    }
-
-    fn add(&mut self, key: u64, moments: &Moments) {
-        match self.cell_for(key, moments.span()) {
-            Some(earlier) => earlier.merge(moments),
-            None => self.push(key, *moments),
+    fn add(&mut self, key: VoxelKey, seen: &Passage) {
+        match self.cell_for(key, seen.span()) {
+            Some(earlier) => earlier.merge(seen),
+            None => self.push(key, *seen),
         }
     }
 
     /// The latest cell of the voxel, if what has been seen in the span of time belongs to it.
     #[inline]
-    fn cell_for(&mut self, key: u64, span: (f64, f64)) -> Option<&mut Moments> {
-        let recent = &mut self.recent[slot(key)];
+    fn cell_for(&mut self, key: VoxelKey, span: (f64, f64)) -> Option<&mut Passage> {
+        let recent = &mut self.recent[key.class(RECENT_BITS)];
         if recent.0 != key {
             *recent = (key, *self.open.get(&key)?);
         }
-        let moments = &mut self.merged[recent.1].moments;
-        belongs(moments.span(), span, self.settings).then_some(moments)
+        let passage = &mut self.merged[recent.1].passage;
+        belongs(passage.span(), span, self.settings).then_some(passage)
     }
 
     /// Opens the next cell of a voxel.
-    fn push(&mut self, key: u64, moments: Moments) {
-        self.recent[slot(key)] = (key, self.merged.len());
+    fn push(&mut self, key: VoxelKey, passage: Passage) {
+        self.recent[key.class(RECENT_BITS)] = (key, self.merged.len());
         self.open.insert(key, self.merged.len());
-        self.merged.push(Cell { key, moments });
+        self.merged.push(Cell { key, passage });
     }
-}
-
-/// Place of a key among the recent ones.
-#[inline]
-fn slot(key: u64) -> usize {
-    (key.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> (64 - RECENT_BITS)) as usize
 }
 
 #[inline]
@@ -264,13 +247,14 @@ fn belongs(earlier: (f64, f64), later: (f64, f64), settings: &Settings) -> bool 
 /// Adds the surfel of a cell, if it is one; returns whether it is.
 fn push_surfel(
     set: &mut SurfelSet,
-    moments: &Moments,
+    passage: &Passage,
     origin: &Vector3<f64>,
     size: f64,
     trajectory: &Trajectory,
     head: &Head,
     settings: &Settings,
 ) -> bool {
+    let moments = &passage.moments;
     if moments.n() < settings.min_points {
         return false;
     }
@@ -284,7 +268,7 @@ fn push_surfel(
     if !is_surface {
         return false;
     }
-    let (stamp, angle) = (moments.mean_time(), moments.mean_angle());
+    let (stamp, angle) = (passage.mean_time(), passage.mean_angle());
     let pose = trajectory.pose(stamp - head.latency);
     let (R_imu_lidar, t_imu_lidar) = head.lidar_in_imu(angle);
     let R_lidar_map = (pose.R * R_imu_lidar).transpose();
@@ -332,7 +316,7 @@ fn without_range_noise(
 struct Packing<'a> {
     points: &'a [[f64; 3]],
     size: f64,
-    keys: &'a mut [u64],
+    keys: &'a mut [VoxelKey],
 }
 
 impl WithSimd for Packing<'_> {
@@ -341,35 +325,9 @@ impl WithSimd for Packing<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
         for (p, key) in self.points.iter().zip(self.keys) {
-            *key = pack(p, self.size);
+            *key = VoxelKey::of_whole([p[0], p[1], p[2]].map(|c| (c / self.size).floor()));
         }
     }
-}
-
-#[inline(always)]
-fn pack(p: &[f64; 3], size: f64) -> u64 {
-    let [x, y, z] = [p[0], p[1], p[2]].map(|c| index_bits((c / size).floor()));
-    x << (2 * KEY_BITS) | y << KEY_BITS | z
-}
-
-/// The lowest bits of an integer and the offset. A float of 3 · 2⁵¹ has room for them in its last
-/// bits; processors have no conversion of several floats at a time that is safe for all values.
-#[inline(always)]
-fn index_bits(whole: f64) -> u64 {
-    const ROOM: f64 = 3.0 * (1u64 << 51) as f64;
-    (whole + ROOM).to_bits().wrapping_add(KEY_OFFSET as u64) & KEY_MASK
-}
-
-/// Key of the voxel of twice the size that contains the voxel of `key`.
-///
-/// Half the offset is added back so that the coordinate zero keeps its place.
-fn coarser(key: u64) -> u64 {
-    let mut coarse = 0;
-    for shift in [2 * KEY_BITS, KEY_BITS, 0] {
-        let i = ((key >> shift & KEY_MASK) as i64 - KEY_OFFSET).div_euclid(2) + KEY_OFFSET;
-        coarse = coarse << KEY_BITS | (i as u64 & KEY_MASK);
-    }
-    coarse
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@
     reason = "only what is inlined into a dispatched function uses the machine's instructions"
 )]
 
-use bentwing_trajectory::{Head, Trajectory};
+use bentwing_trajectory::{Head, Trajectory, so3};
 use nalgebra::{Matrix3, Vector3};
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
@@ -42,15 +42,13 @@ pub(crate) struct Placer<'a> {
 impl<'a> Placer<'a> {
     pub(crate) fn new(trajectory: &'a Trajectory, head: &'a Head) -> Self {
         let rotations = trajectory.rotations().iter();
-        let rotations = rotations
-            .map(|q| q.to_rotation_matrix().into_inner())
-            .collect();
+        let rotations = rotations.map(so3::matrix).collect();
         let base = &head.T_imu_base;
         Self {
             trajectory,
             head,
             rotations,
-            R_imu_base: base.rotation.to_rotation_matrix().into_inner(),
+            R_imu_base: so3::matrix(&base.rotation),
             t_imu_base: base.translation.vector,
         }
     }
@@ -144,7 +142,7 @@ impl WithSimd for Chunk<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bentwing_trajectory::{Motor, so3};
+    use bentwing_trajectory::Motor;
     use nalgebra::Isometry3;
 
     #[test]

@@ -35,10 +35,7 @@ impl Head {
             None => base,
             Some(m) => base * turn(m, theta) * m.T_motor_lidar,
         };
-        (
-            T.rotation.to_rotation_matrix().into_inner(),
-            T.translation.vector,
-        )
+        (so3::matrix(&T.rotation), T.translation.vector)
     }
 
     /// The point `p_lidar` in the base frame (lidar frame, or motor frame before its rotation),

@@ -138,7 +138,7 @@ fn relative_rotation(trajectory: &Trajectory, n: usize, t: f64) -> Matrix3<f64> 
     } else {
         steps[n.min(steps.len() - 1)]
     } * u;
-    so3::exp(&phi).to_rotation_matrix().into_inner()
+    so3::matrix(&so3::exp(&phi))
 }
 
 #[cfg(test)]

@@ -138,7 +138,7 @@ impl Trajectory {
         let R = self.rotations[n] * so3::exp(&(self.steps[n] * u));
         Pose {
             p,
-            R: R.to_rotation_matrix().into_inner(),
+            R: so3::matrix(&R),
         }
     }
 
@@ -172,11 +172,10 @@ impl Trajectory {
     /// Composes a correction into every sample: `p ← p + δt`, `R ← Exp(δr) R` (Kaul 2015, eq. 3).
     ///
     /// There is one `[δr, δt]` per sample.
-    pub fn correct(&mut self, corrections: &[[Vector3<f64>; 2]]) {
-        for (n, [dr, dp]) in corrections.iter().enumerate() {
-            self.positions[n] += dp;
-            let corrected = so3::exp(dr) * self.rotations[n];
-            self.rotations[n] = UnitQuaternion::new_normalize(corrected.into_inner());
+    pub fn correct(&mut self, corrections: &[[f64; 6]]) {
+        for (n, &[a, b, c, x, y, z]) in corrections.iter().enumerate() {
+            self.positions[n] += Vector3::new(x, y, z);
+            self.rotations[n] = so3::turned(&Vector3::new(a, b, c), &self.rotations[n]);
         }
         self.steps = steps_in_body(&self.rotations, std::mem::take(&mut self.steps));
     }
@@ -219,7 +218,7 @@ mod tests {
             let pose = trajectory.pose(t);
             let expected = so3::exp(&(Vector3::new(0.2, -0.1, 6.0) * (t - 5.0)));
             assert!((pose.p.x - (t - 5.0)).abs() < 1e-12);
-            assert!((pose.R - expected.to_rotation_matrix().into_inner()).norm() < 1e-12);
+            assert!((pose.R - so3::matrix(&expected)).norm() < 1e-12);
         }
     }
 
@@ -243,9 +242,9 @@ mod tests {
         let mut trajectory = spinning();
         let before = trajectory.pose(5.5);
         let dr = Vector3::new(0.3, 0.0, 0.0);
-        trajectory.correct(&[[dr, Vector3::new(0.0, 1.0, 0.0)]; 101]);
+        trajectory.correct(&[[0.3, 0.0, 0.0, 0.0, 1.0, 0.0]; 101]);
         let after = trajectory.pose(5.5);
-        let turn = so3::exp(&dr).to_rotation_matrix().into_inner();
+        let turn = so3::matrix(&so3::exp(&dr));
         assert!((after.R - turn * before.R).norm() < 1e-12);
         assert!((after.p - before.p - Vector3::y()).norm() < 1e-12);
     }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The rotation group: exponential, logarithm and the Jacobian of the logarithm.
+//! The rotation group: exponential, logarithm and its Jacobian, and quaternions as matrices.
 
-use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
 
 /// Below this angle the series replace the closed forms; their error is then under 1e-17.
 const SMALL_ANGLE: f64 = 1e-4;
@@ -36,6 +36,30 @@ pub fn log(q: &UnitQuaternion<f64>) -> Vector3<f64> {
         2.0 * sin.atan2(q.w * sign) / sin
     };
     v * scale
+}
+
+/// `Exp(phi) R`, with unit norm again: the perturbation on the left, in the outer frame of R.
+#[inline]
+pub fn turned(phi: &Vector3<f64>, R: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
+    renormalized(exp(phi) * R)
+}
+
+/// The same rotation without the norm's rounding errors.
+#[inline]
+pub fn renormalized(q: UnitQuaternion<f64>) -> UnitQuaternion<f64> {
+    UnitQuaternion::new_normalize(q.into_inner())
+}
+
+/// The matrix of a rotation.
+#[inline]
+pub fn matrix(q: &UnitQuaternion<f64>) -> Matrix3<f64> {
+    q.to_rotation_matrix().into_inner()
+}
+
+/// The rotation of a matrix that is one.
+#[inline]
+pub fn of_matrix(R: Matrix3<f64>) -> UnitQuaternion<f64> {
+    UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(R))
 }
 
 /// Inverse of the right Jacobian: `log(exp(phi) · exp(δ)) ≈ phi + right_jacobian_inverse(phi) δ`.

@@ -148,6 +148,7 @@ def _result(
         rotation_eigenvalues=np.array(found.rotation_eigenvalues),
         iterations=found.n_outer,
         converged=found.converged,
+        covariances=found.sample_covariances(),
         _surfels=surfels,
         _samples=found.samples,
         _globals=found.globals,

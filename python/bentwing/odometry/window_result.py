@@ -48,6 +48,9 @@ class WindowResult(Value):
         rotation, increasing; 1/3 each is even, near zero is not seen
     iterations : how often the surfaces were matched anew
     converged : whether the last correction was below the thresholds
+    covariances : (N, 6, 6) of the correction [rotation, translation] at each prior pose, rad and m,
+        perturbed on the left in the map frame; from the last linearized equations as if all matches
+        were independent, so that their ratios say more than their size; zero where the past stays
     """
 
     trajectory: Trajectory
@@ -61,6 +64,7 @@ class WindowResult(Value):
     rotation_eigenvalues: NDArray[np.float64]
     iterations: int
     converged: bool
+    covariances: NDArray[np.float64]
     _surfels: _core.Surfels = field(repr=False, compare=False)
     _samples: _core.Samples = field(repr=False, compare=False)
     _globals: _core.Globals = field(repr=False, compare=False)

@@ -89,6 +89,23 @@ def test_points_that_are_stamped_late_are_taken_back_by_the_latency_of_the_paylo
     assert np.abs(result.trajectory.positions - in_time.trajectory.positions).max() < 1e-3
 
 
+def test_the_covariances_say_where_the_correction_is_certain():
+    points, times = seen(truth())
+    head = {"payload": PAYLOAD, "settings": SETTINGS}
+    covariances = register_window(points, times, disturbed(truth()), **head).covariances
+    assert covariances.shape == (len(truth().times), 6, 6)
+    np.testing.assert_array_equal(covariances, covariances.transpose(0, 2, 1))
+    assert np.linalg.eigvalsh(covariances).min() > 0
+    # The first pose is held to 10 µrad and 0.1 mm.
+    std = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
+    np.testing.assert_array_less(std[0], 1.001 * np.repeat([1e-5, 1e-4], 3))
+    # Behind the last point nothing but the prior's velocity says where the lidar is.
+    assert (std[-1, 3:] > std[len(std) // 2, 3:]).all()
+    joined = register_window(points, times, truth(), **head, continues=True).covariances
+    assert not joined[0].any()
+    assert joined[60:].any(axis=(1, 2)).all()
+
+
 def test_an_earlier_window_holds_a_later_one():
     points, times = seen(truth())
     early, late = times < 1.5, times >= 1.5

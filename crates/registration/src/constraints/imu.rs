@@ -4,7 +4,7 @@
 use bentwing_trajectory::{CorrectionSpline, Imu, NodeForce, Trajectory, so3};
 use nalgebra::{Matrix3, Vector3};
 
-use super::{StencilRows, add_stencil};
+use super::stencil::{StencilRows, add_stencil};
 use crate::{Globals, ImuNoise, NormalEquations, index};
 
 /// `e = dθ_n/dt − b_g − Log(R_nᵀ R_{n+1})/dt`, rad/s, imu frame.
@@ -67,9 +67,7 @@ fn add_gyro(
     let dt = trajectory.dt();
     let times = [trajectory.time(n), trajectory.time(n + 1)];
     let stencil = spline.stencil(times, [-1.0 / dt, 1.0 / dt]);
-    let R_next = trajectory.rotations()[n + 1]
-        .to_rotation_matrix()
-        .into_inner();
+    let R_next = so3::matrix(&trajectory.rotations()[n + 1]);
     let J = -so3::right_jacobian_inverse(&trajectory.steps()[n]) * R_next.transpose();
     let e = gyro_residual(trajectory, globals, n, turned);
     let group = rows.group(stencil.first);
@@ -95,10 +93,7 @@ fn add_accel(
     let d2 = 1.0 / (dt * dt);
     let curvature = spline.stencil(times, [d2, -2.0 * d2, d2]);
     let value = spline.stencil(times, [0.0, 1.0, 0.0]);
-    let R_imu_map = trajectory.rotations()[n]
-        .to_rotation_matrix()
-        .into_inner()
-        .transpose();
+    let R_imu_map = so3::matrix(&trajectory.rotations()[n]).transpose();
     let force = trajectory.acceleration(n) + globals.gravity;
     let J_rotation = -R_imu_map * so3::hat(&force);
     let J_gravity: Matrix3<f64> = R_imu_map * so3::hat(&globals.gravity);

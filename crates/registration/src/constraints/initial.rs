@@ -3,8 +3,7 @@
 
 use bentwing_trajectory::CorrectionSpline;
 
-use crate::NormalEquations;
-use crate::rows::RowGroup;
+use crate::{NormalEquations, RowGroup};
 
 /// Standard deviations of the correction `[δr, δt]` of a first pose, rad and m.
 pub type Sigmas = [f64; 6];

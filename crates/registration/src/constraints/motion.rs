@@ -4,7 +4,7 @@
 use bentwing_trajectory::{CorrectionSpline, Trajectory, so3};
 use nalgebra::{Matrix3, Vector3};
 
-use super::{StencilRows, add_stencil};
+use super::stencil::{StencilRows, add_stencil};
 use crate::{NormalEquations, Settings};
 
 /// Change of the angular rate around sample `n`, rad/s², imu frame; `1 <= n < len - 1`.
@@ -60,12 +60,7 @@ fn add_angular(
     let d2 = 1.0 / (dt * dt);
     let after = spline.stencil(times, [0.0, -d2, d2]);
     let before = spline.stencil(times, [d2, -d2, 0.0]);
-    let R_imu_map = |n: usize| {
-        trajectory.rotations()[n]
-            .to_rotation_matrix()
-            .into_inner()
-            .transpose()
-    };
+    let R_imu_map = |n: usize| so3::matrix(&trajectory.rotations()[n]).transpose();
     let steps = trajectory.steps();
     let J_after = so3::right_jacobian_inverse(&steps[n]) * R_imu_map(n + 1);
     let J_before = so3::right_jacobian_inverse(&steps[n - 1]) * R_imu_map(n);

@@ -9,7 +9,7 @@ use std::ops::Range;
 use bentwing_trajectory::{CorrectionSpline, Trajectory, so3};
 use nalgebra::{Matrix3, Vector3};
 
-use super::{StencilRows, add_stencil};
+use super::stencil::{StencilRows, add_stencil};
 use crate::NormalEquations;
 
 /// Slower than this nothing flies, m/s and rad/s: a trajectory that rests was made so.
@@ -64,9 +64,7 @@ fn add_step(
     let dt = trajectory.dt();
     let times = [trajectory.time(n), trajectory.time(n + 1)];
     let stencil = spline.stencil(times, [-1.0 / dt, 1.0 / dt]);
-    let R_next = trajectory.rotations()[n + 1]
-        .to_rotation_matrix()
-        .into_inner();
+    let R_next = so3::matrix(&trajectory.rotations()[n + 1]);
     let J = so3::right_jacobian_inverse(&trajectory.steps()[n]) * R_next.transpose();
     let (v, omega) = rates(trajectory, n);
     let group = rows.group(stencil.first);

@@ -6,8 +6,8 @@
     reason = "only what is inlined into a dispatched function uses the machine's instructions"
 )]
 
-use bentwing_surfels::sym3;
 use bentwing_trajectory::{Head, so3};
+use bentwing_voxels::sym3;
 use nalgebra::{Matrix3, Vector3};
 
 use crate::index;
@@ -108,9 +108,9 @@ pub fn add_globals(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::RowGroup;
     use crate::constraints::testing::{Scene, assert_row};
     use crate::placed::place;
-    use crate::rows::RowGroup;
     use proptest::prelude::*;
 
     proptest! {

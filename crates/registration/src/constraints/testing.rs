@@ -7,8 +7,7 @@ use nalgebra::{Isometry3, Matrix3, Vector3};
 use proptest::prelude::*;
 use proptest::test_runner::TestCaseError;
 
-use crate::rows::RowGroup;
-use crate::{Globals, ImuNoise, N_GLOBALS, NormalEquations, Settings};
+use crate::{Globals, ImuNoise, N_GLOBALS, NormalEquations, RowGroup, Settings};
 
 pub fn settings() -> Settings {
     Settings {
@@ -138,13 +137,7 @@ impl Scene {
     fn corrected(&self, controls: &[[f64; 6]]) -> Trajectory {
         let spline = self.spline();
         let mut trajectory = self.trajectory.clone();
-        let correction = |n| {
-            let d = spline.evaluate(controls, self.trajectory.time(n));
-            [
-                Vector3::new(d[0], d[1], d[2]),
-                Vector3::new(d[3], d[4], d[5]),
-            ]
-        };
+        let correction = |n| spline.evaluate(controls, self.trajectory.time(n));
         let corrections: Vec<_> = (0..trajectory.len()).map(correction).collect();
         trajectory.correct(&corrections);
         trajectory

@@ -3,8 +3,7 @@
 
 use bentwing_trajectory::CorrectionSpline;
 
-use crate::rows::RowGroup;
-use crate::{NormalEquations, Settings};
+use crate::{NormalEquations, RowGroup, Settings};
 
 /// Adds the differences of neighbouring control points as rows: `(c_{m+1} − c_m) / h` is the
 /// correction of the velocity.

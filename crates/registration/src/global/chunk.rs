@@ -4,15 +4,14 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use bentwing_neighbors::{Grid, Search, mutual_pairs};
 use bentwing_surfels::SurfelSet;
 use rayon::prelude::*;
 
-use super::piece::PieceState;
+use super::bend::{Bend, N_NEIGHBORS, bends};
 use crate::Settings;
-use crate::bend::{Bend, N_NEIGHBORS, bends};
-use crate::matches::{grid_of, search};
-use crate::placed::Placed;
+use crate::neighbors::{Grid, Search, mutual_pairs};
+use crate::placed::{Placed, grid_of};
+use crate::state::State;
 
 /// A stretch and where it belongs.
 pub struct Chunk {
@@ -40,10 +39,8 @@ pub struct Searched {
 
 impl Laid {
     /// Places the surfels of a stretch and, given settings, searches them in themselves.
-    pub fn new(chunk: &Chunk, states: &[PieceState<'_>], search: Option<&Settings>) -> Self {
-        let state = &states[chunk.piece];
-        let sets = std::slice::from_ref(&chunk.surfels);
-        let placed = Placed::new(sets, &state.trajectory, &state.globals, &state.spline);
+    pub fn new(chunk: &Chunk, states: &[State<'_>], search: Option<&Settings>) -> Self {
+        let placed = states[chunk.piece].place(std::slice::from_ref(&chunk.surfels));
         let searched = search.map_or_else(Searched::default, |s| Searched::of(&placed, s));
         Self { placed, searched }
     }
@@ -60,7 +57,7 @@ impl Searched {
                 &grid,
                 &Search {
                     k,
-                    ..search(settings)
+                    ..settings.search()
                 },
             );
             let pairs = mutual_pairs(&nearest, settings.n_neighbors).collect();
@@ -89,12 +86,7 @@ impl<'a> Holder<'a> {
     }
 
     /// Makes sure that all of `needed` are there.
-    pub fn provide(
-        &mut self,
-        needed: &BTreeSet<usize>,
-        chunks: &[Chunk],
-        states: &[PieceState<'_>],
-    ) {
+    pub fn provide(&mut self, needed: &BTreeSet<usize>, chunks: &[Chunk], states: &[State<'_>]) {
         let missing: Vec<usize> = needed
             .iter()
             .copied()

@@ -10,8 +10,8 @@ use super::chunk::{Chunk, Holder, Laid};
 use super::joint::Joint;
 use super::link::{Link, LinkEquations, LinkMatch, LinkSum};
 use super::overlap::{follow, links};
-use super::piece::PieceState;
-use super::{Counts, GlobalProblem};
+use super::problem::{Counts, GlobalProblem};
+use crate::state::State;
 use crate::{Health, NormalEquations, Settings};
 
 /// Links that are worked on side by side; fixed, so that nothing depends on the number of threads.
@@ -28,11 +28,7 @@ pub struct Gatherer {
 }
 
 impl Gatherer {
-    pub fn new(
-        problem: &GlobalProblem<'_>,
-        states: &[PieceState<'_>],
-        settings: &Settings,
-    ) -> Self {
+    pub fn new(problem: &GlobalProblem<'_>, states: &[State<'_>], settings: &Settings) -> Self {
         let of_piece = problem.pieces.iter().enumerate().flat_map(|(piece, p)| {
             let filled = p.chunks.iter().filter(|s| !s.is_empty());
             filled.map(move |s| Chunk {
@@ -78,7 +74,7 @@ impl Gatherer {
         &mut self,
         equations: &mut NormalEquations,
         joint: &Joint,
-        states: &[PieceState<'_>],
+        states: &[State<'_>],
         scale: f64,
     ) -> (Health, usize) {
         let (mut health, mut n_far) = (Health::default(), 0);
@@ -96,7 +92,7 @@ impl Gatherer {
     }
 
     /// How the matches fit.
-    pub fn health(&mut self, states: &[PieceState<'_>], scale: f64) -> Health {
+    pub fn health(&mut self, states: &[State<'_>], scale: f64) -> Health {
         let (joint, mut health) = (Joint::new(states), Health::default());
         self.each(states, &joint, scale, |_, part| health.merge(&part.health));
         health
@@ -104,7 +100,7 @@ impl Gatherer {
 
     fn each(
         &mut self,
-        states: &[PieceState<'_>],
+        states: &[State<'_>],
         joint: &Joint,
         scale: f64,
         mut take: impl FnMut(&Link, &LinkEquations),
@@ -144,7 +140,7 @@ pub(super) fn sum(
     link: &Link,
     matches: &[LinkMatch],
     laid: [&Laid; 2],
-    states: &[PieceState<'_>],
+    states: &[State<'_>],
     joint: &Joint,
     scale: f64,
 ) -> LinkEquations {

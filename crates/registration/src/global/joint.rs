@@ -5,10 +5,10 @@
 //! they were control points: the system is one sparse matrix of 6×6 blocks, whatever the number of
 //! pieces, and the solver's order keeps its fill low.
 
-use super::piece::PieceState;
-use crate::normal_equations::Block;
-use crate::solve::{Factorized, Solution};
-use crate::{GlobalMatrix, N_GLOBALS, NormalEquations};
+use crate::state::State;
+use crate::system::normal_equations::Block;
+use crate::system::solve::Factorized;
+use crate::{GlobalMatrix, N_GLOBALS, NormalEquations, Solution};
 
 /// Control points that the global states of a piece fill.
 pub const N_STAND_INS: usize = N_GLOBALS.div_ceil(6);
@@ -20,7 +20,7 @@ pub struct Joint {
 }
 
 impl Joint {
-    pub fn new(states: &[PieceState<'_>]) -> Self {
+    pub fn new(states: &[State<'_>]) -> Self {
         let mut first = vec![0];
         for state in states {
             first.push(first[first.len() - 1] + state.spline.n_controls());
@@ -38,10 +38,10 @@ impl Joint {
     }
 
     /// Unknowns that are estimated.
-    pub fn n_unknowns(&self, states: &[PieceState<'_>]) -> usize {
+    pub fn n_unknowns(&self, states: &[State<'_>]) -> usize {
         let active = states
             .iter()
-            .map(|s| s.frozen().iter().filter(|f| !*f).count());
+            .map(|s| s.prior.frozen.iter().filter(|f| !*f).count());
         6 * self.first[self.n_pieces()] + active.sum::<usize>()
     }
 
@@ -101,12 +101,17 @@ impl Joint {
 
     /// Takes what is not estimated out of the equations: what is frozen, and what fills up the
     /// stand-ins.
-    pub fn freeze(&self, equations: &mut NormalEquations, states: &[PieceState<'_>]) {
+    pub fn freeze(&self, equations: &mut NormalEquations, states: &[State<'_>]) {
         let first = self.stand_in(0);
         let frozen = |control: usize, i: usize| {
             let place = 6 * (control - first) + i;
             let (piece, state) = (place / (6 * N_STAND_INS), place % (6 * N_STAND_INS));
-            states[piece].frozen().get(state).copied().unwrap_or(true)
+            states[piece]
+                .prior
+                .frozen
+                .get(state)
+                .copied()
+                .unwrap_or(true)
         };
         for ((row, column), block) in equations.blocks_mut() {
             for (c, entries) in block.iter_mut().enumerate() {
@@ -145,10 +150,10 @@ impl Joint {
         &self,
         factorized: &Factorized,
         piece: usize,
-        state: &PieceState<'_>,
+        state: &State<'_>,
     ) -> GlobalMatrix {
-        let all = factorized.covariance(self.stand_in(piece)..self.stand_in(piece + 1));
-        let frozen = state.frozen();
+        let all = factorized.covariance(self.stand_in(piece)..self.stand_in(piece + 1), &[]);
+        let frozen = state.prior.frozen;
         GlobalMatrix::from_fn(|r, c| {
             if frozen[r] || frozen[c] {
                 0.0

@@ -6,19 +6,17 @@
     reason = "only what is inlined into a dispatched function uses the machine's instructions"
 )]
 
-use bentwing_neighbors::{Search, claimed_pairs};
 use pulp::{Simd, WithSimd};
 
+use super::bend;
 use super::chunk::Laid;
 use super::joint::{Joint, N_STAND_INS};
-use super::piece::PieceState;
-use crate::bend;
 use crate::constraints::surfel_match::{self, MatchPlane};
-use crate::matches;
+use crate::neighbors::{Search, claimed_pairs};
 use crate::placed::PlacedSurfel;
 use crate::robust::cauchy_weight;
-use crate::rows::RowGroup;
-use crate::{Health, N_GLOBALS, NormalEquations, Settings};
+use crate::state::State;
+use crate::{Health, N_GLOBALS, NormalEquations, RowGroup, Settings};
 
 /// A surfel of the one stretch, one of the other, and their plane.
 #[derive(Clone, Copy, Debug)]
@@ -93,7 +91,7 @@ impl Link {
             } else {
                 -1.0
             },
-            ..matches::search(settings)
+            ..settings.search()
         };
         let nearest = b.searched.grids[level].nearest(&a.searched.grids[level], &search);
         claimed_pairs(&nearest, b.searched.grids[level].len())
@@ -163,7 +161,7 @@ pub struct LinkSum<'a> {
     pub link: &'a Link,
     pub matches: &'a [LinkMatch],
     pub laid: [&'a Laid; 2],
-    pub states: &'a [PieceState<'a>],
+    pub states: &'a [State<'a>],
     pub joint: &'a Joint,
     pub scale: f64,
 }

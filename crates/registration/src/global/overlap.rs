@@ -3,26 +3,27 @@
 
 use std::collections::BTreeSet;
 
+use bentwing_voxels::{VoxelKey, voxel_of};
 use rayon::prelude::*;
 
 use super::chunk::{Chunk, Laid};
-use super::{Plan, piece::PieceState};
+use super::problem::Plan;
+use crate::state::State;
 
 /// Edge of the places that are compared, m: that of the second coarsest of the usual levels.
 const PLACE: f64 = 1.6;
 
 /// The places a stretch has seen, and from which side: sorted and without repetition.
-pub struct Places(Vec<[i32; 4]>);
+pub struct Places(Vec<(VoxelKey, u8)>);
 
 impl Places {
     fn of(laid: &Laid) -> Self {
         let surfels = laid.placed.surfels.iter();
-        let mut keys: Vec<[i32; 4]> = surfels
+        let mut keys: Vec<(VoxelKey, u8)> = surfels
             .map(|s| {
-                let cell = s.mean.map(|x| (x / PLACE).floor() as i32);
                 let axis = s.normal.iamax();
-                let side = axis as i32 * 2 + i32::from(s.normal[axis] > 0.0);
-                [cell.x, cell.y, cell.z, side]
+                let side = axis as u8 * 2 + u8::from(s.normal[axis] > 0.0);
+                (VoxelKey::new(voxel_of(&s.mean.into(), PLACE)), side)
             })
             .collect();
         keys.sort_unstable();
@@ -49,7 +50,7 @@ impl Places {
 /// Each is matched with itself, with its successor, and with at most `n_visits` others, the best one
 /// of each of as many groups that follow each other in time: so that different visits take part, and the
 /// number of matches grows no faster than the recording.
-pub fn links(chunks: &[Chunk], states: &[PieceState<'_>], plan: &Plan) -> Vec<(usize, usize)> {
+pub fn links(chunks: &[Chunk], states: &[State<'_>], plan: &Plan) -> Vec<(usize, usize)> {
     let places = |c: &Chunk| Places::of(&Laid::new(c, states, None));
     let places: Vec<Places> = chunks.par_iter().map(places).collect();
     let chosen: Vec<Vec<usize>> = (0..chunks.len())

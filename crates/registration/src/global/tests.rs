@@ -2,14 +2,17 @@
 //! A room seen again and again along a trajectory that has drifted: the truth is exact.
 
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
+use bentwing_surfels::SurfelSet;
+use bentwing_trajectory::{Head, Trajectory, so3};
 use nalgebra::{DMatrix, Isometry3, Matrix3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
 use super::*;
 use crate::constraints::testing::{Scene, settings};
 use crate::placed::place;
-use bentwing_trajectory::{Head, so3};
+use crate::{GlobalMatrix, GlobalPrior, Globals};
 
 /// Seconds of a lap, and what the room measures, m.
 const LAP: f64 = 20.0;
@@ -264,7 +267,7 @@ fn a_stretch_is_matched_with_few_others_however_often_it_is_seen() {
         pieces: vec![piece],
         plan,
     };
-    let states = [PieceState::new(&problem.pieces[0], &of_global())];
+    let states = [problem.pieces[0].state(&of_global())];
     let counts = Gatherer::new(&problem, &states, &of_global()).counts();
     // Twelve stretches; all of them see the whole room.
     assert!(counts.n_far_links >= 12, "{counts:?}");
@@ -292,8 +295,8 @@ proptest! {
             prior: &known,
         };
         let pieces = [piece(&one), piece(&two)];
-        let states: Vec<PieceState<'_>> =
-            pieces.iter().map(|p| PieceState::new(p, &settings())).collect();
+        let states: Vec<State<'_>> =
+            pieces.iter().map(|p| p.state(&settings())).collect();
         let joint = Joint::new(&states);
         let other = usize::from(!same);
         let at = |p: usize| chunk::Chunk { piece: p, surfels: chunks[0].clone() };

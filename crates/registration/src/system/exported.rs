@@ -21,7 +21,7 @@ pub struct System {
 }
 
 impl System {
-    /// The system that [`Solver::factorize`] factorizes.
+    /// The system that [`crate::Solver::factorize`] factorizes.
     ///
     /// # Errors
     /// When it has no symbolic factorization.

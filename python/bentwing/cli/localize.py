@@ -47,7 +47,7 @@ def command(
     # slow to import, so only when it is needed
     from bentwing.base.progress import create_progress
     from bentwing.cli.done import say_run
-    from bentwing.cli.settings_options import choose, given
+    from bentwing.run.choose import choose, given
     from bentwing.run.pipeline import run_recording
 
     asked = given(

@@ -60,8 +60,8 @@ def command(
     # slow to import, so only when it is needed
     from bentwing.base.progress import create_progress
     from bentwing.cli.done import say_maps, say_run
-    from bentwing.cli.settings_options import choose, given
     from bentwing.recording.flights import flights_of
+    from bentwing.run.choose import choose, given
     from bentwing.run.flights import map_flights
     from bentwing.run.pipeline import run_recording
 

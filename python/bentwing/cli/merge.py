@@ -39,8 +39,8 @@ def command(
     # slow to import, so only when it is needed
     from bentwing.base.progress import create_progress
     from bentwing.cli.done import say_maps
-    from bentwing.cli.settings_options import given
     from bentwing.map.clean import CleanSettings
+    from bentwing.run.choose import given
     from bentwing.run.merging import merge
 
     merged = merge(

@@ -19,9 +19,9 @@ from bentwing.map.project import project
 from bentwing.map.writer import open_map
 from bentwing.recording import Payload, Recording
 from bentwing.recording.preprocess import RecordingPart
+from bentwing.run.choose import as_run_settings
 from bentwing.run.pipeline import run_recording
 from bentwing.run.run import Run
-from bentwing.run.settings import as_run_settings
 from bentwing.simulate.instruments import TerrestrialErrors, choose_stations, scan, track
 from bentwing.simulate.ros import EPOCH_NS
 from bentwing.simulate.scenario import Scenario
@@ -119,7 +119,7 @@ def fly_and_map(plan: FlightPlan, assignment: Assignment) -> Flown:
 
         files = write_recording(setup, scenario, folder, advance)
     out = folder / "run"
-    settings = as_run_settings(estimator="continuous", payload=files.payload, settings=None)
+    settings = as_run_settings(payload=files.payload)
     found = run_recording(
         files.recording, out, settings, files.payload, progress=assignment.progress
     )

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bentwing.base.errors import UsageError
-from bentwing.base.progress import Progress
+from bentwing.base.progress import Progress, as_progress
 from bentwing.base.run_record import read_record
 from bentwing.run.folder import RunFolder
 from bentwing.run.merging import merge_into, open_sources
@@ -55,7 +55,7 @@ def map_flights(
                 "and merge the runs"
             )
             raise UsageError(msg)
-    shown, names = progress or Progress(), flight_names(flights)
+    shown, names = as_progress(progress), flight_names(flights)
     merging = merge_settings(
         map_format=settings.map_format,
         map_spacing=settings.map_spacing,

@@ -9,21 +9,21 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bentwing import odometry
-from bentwing.base.arguments import instance
-from bentwing.base.progress import Progress
+from bentwing.base.progress import as_progress
 from bentwing.closing.localize import read_prior_map
 from bentwing.recording import Recording
 from bentwing.recording.preprocess import RecordingPart
 from bentwing.run import stages
 from bentwing.run.checkpoint import Checkpoint
+from bentwing.run.choose import as_run_settings
 from bentwing.run.folder import RunFolder
 from bentwing.run.report import report_failure, report_run
 from bentwing.run.run import Run
-from bentwing.run.settings import as_run_settings
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    from bentwing.base.progress import Progress
     from bentwing.closing.georeference import GeoreferenceSettings
     from bentwing.closing.localize import PriorMap
     from bentwing.map import MapFormat
@@ -39,14 +39,14 @@ def map_recording(
     payload: PayloadLike,
     out: Path | str,
     *,
-    estimator: EstimatorName = "continuous",
-    map_format: MapFormat = "laz",
-    map_spacing: float = 0.0,
+    estimator: EstimatorName | None = None,
+    map_format: MapFormat | None = None,
+    map_spacing: float | None = None,
     cleaning: CleanSettings | None = None,
     georeferencing: GeoreferenceSettings | None = None,
     loop_closure: bool = True,
     prior_map: Path | str | None = None,
-    settings: EstimatorSettings | None = None,
+    settings: EstimatorSettings | Path | str | None = None,
     threads: int | None = None,
     start: float | None = None,
     duration: float | None = None,
@@ -60,16 +60,17 @@ def map_recording(
     paths : one recording, or its consecutive parts
     payload : the sensor head, or the payload.yaml that describes it
     out : the run folder; see `RunFolder` for what may be there already
-    estimator : `continuous`, `kalman` or `ndt`
-    map_format : `laz`, `las`, `ply`, `pcd` or `e57`
-    map_spacing : m, edge of the voxels that keep one point each; 0 keeps all points
+    estimator : `continuous`, `kalman` or `ndt`; default: `continuous`
+    map_format : `laz`, `las`, `ply`, `pcd` or `e57`; default: `laz`
+    map_spacing : m, edge of the voxels that keep one point each; default: 0, which keeps all points
     cleaning : what the map leaves out; default: mixed pixels and what moved
     georeferencing : how GNSS fixes and control points are used; default: fixes, where the payload
         names their topic, as a rigid fit
     loop_closure : whether places seen again may correct the trajectory
     prior_map : a run folder or a cloud in which the recording is localized: trajectory and map are
         then in its frame, and the points that have changed are written too
-    settings : of the estimator; default: its defaults
+    settings : of the estimator, or a YAML file of what `bentwing map --print-settings` prints, all or
+        some of it, over which the other arguments stand; default: the defaults
     threads : of the estimator; default: all cores
     start, duration : s, the part of the recording to use; default: all of it
     resume : go on behind the last stage that an earlier run in `out` has finished, if there is one
@@ -121,14 +122,13 @@ def run_recording(
     engine = odometry.create(
         settings.estimator, settings.payload, settings.of_estimator, settings.threads
     )
-    if progress is not None:
-        instance("progress", progress, Progress, "give a Progress, or None to say nothing")
+    watch = as_progress(progress)
     with (
         Recording(paths, settings.payload) as recording,
         RunFolder(Path(out), settings.to_json()) as folder,
     ):
         part = RecordingPart(recording, settings.payload, settings.start, settings.duration)
-        job = stages.Job(part, folder, settings, progress or Progress())
+        job = stages.Job(part, folder, settings, watch)
         with _reported(folder):
             job = replace(job, prior=_open_inputs(job, payload_file))
             checkpoint = Checkpoint(folder)

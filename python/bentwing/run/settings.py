@@ -26,8 +26,7 @@ from bentwing.odometry import (
     NdtSettings,
     require_estimator,
 )
-from bentwing.odometry.registry import require_settings
-from bentwing.recording.payload import Payload, PayloadLike, as_payload
+from bentwing.recording import Payload
 
 _Model = TypeVar("_Model", bound=BaseModel)
 
@@ -130,21 +129,6 @@ class RunSettings(MapSettings):
             # Its mention would say that the head carries one.
             del described["payload"]["imu"]
         return yaml.safe_dump(described, sort_keys=False, allow_unicode=True)
-
-
-def as_run_settings(
-    *,
-    estimator: EstimatorName,
-    payload: PayloadLike,
-    settings: EstimatorSettings | None,
-    **values: Any,  # noqa: ANN401 - the model checks them
-) -> RunSettings:
-    """Return the settings of a run from the arguments of a call, in which None is the default."""
-    require_settings(estimator, settings)
-    given = {name: value for name, value in values.items() if value is not None}
-    if settings is not None:
-        given[estimator] = settings
-    return run_settings(estimator=estimator, payload=as_payload(payload), **given)
 
 
 def run_settings(**values: Any) -> RunSettings:  # noqa: ANN401 - the model checks them

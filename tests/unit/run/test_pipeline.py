@@ -205,6 +205,17 @@ def test_runs_are_copied_and_pickled(tmp_path, recording):
         assert again.map_path == run.map_path
 
 
+def test_settings_of_a_file_are_those_of_the_run_and_arguments_stand_over_them(
+    tmp_path, recording
+):
+    file = tmp_path / "settings.yaml"
+    file.write_text("map_format: ply\nmap_spacing: 5.0\ncontinuous: {window: 4}\n")
+    pipeline.map_recording(recording, PAYLOAD, tmp_path / "out", settings=file, map_spacing=4.0)
+    settings = record_of(tmp_path / "out")["settings"]
+    assert (settings["map_format"], settings["map_spacing"]) == ("ply", 4.0)
+    assert settings["continuous"]["window"] == 4
+
+
 def test_settings_are_written_once_and_read_back_the_same(recording):
     del recording
     settings = run_settings(estimator="kalman", payload=PAYLOAD, map_spacing=0.1)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bentwing.base.errors import UsageError
-from bentwing.base.progress import Progress
+from bentwing.base.progress import Progress, as_progress
 from bentwing.closing.global_registration import Budget
 from bentwing.closing.global_registration.stretches import length_of
 from bentwing.closing.joining.describe import describe_matches, describe_parts_of
@@ -91,7 +91,7 @@ def merge(
         )
         raise UsageError(msg)
     with RunFolder(Path(out), settings.to_json()) as folder:
-        return merge_into(folder, sources, settings, progress or Progress())
+        return merge_into(folder, sources, settings, as_progress(progress))
 
 
 def merge_into(

@@ -1,29 +1,34 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""`--settings FILE` and `--set NAME=VALUE`: the settings that `--print-settings` prints, changed."""
+"""Settings of a run chosen by a file, options and assignments, as `--settings` and `--set` give them."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, get_args
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import yaml
 
 from bentwing.base.errors import InputError, UsageError
 from bentwing.base.plain import plain
 from bentwing.base.yaml_files import read_yaml
-from bentwing.cli.choices import EstimatorName
-from bentwing.recording import Payload
+from bentwing.odometry import ESTIMATORS
+from bentwing.odometry.registry import require_settings
+from bentwing.recording.payload import Payload, PayloadLike, as_payload
 from bentwing.run.settings import RunSettings, validated
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
-    from pathlib import Path
 
-ESTIMATORS = get_args(EstimatorName)
+    from bentwing.odometry import EstimatorName, EstimatorSettings
+
 PAYLOAD = "payload"
 
 
 def choose(
-    file: Path | None, assignments: Iterable[str], payload: Path | None, options: Mapping[str, Any]
+    file: Path | None,
+    assignments: Iterable[str],
+    payload: PayloadLike,
+    options: Mapping[str, Any],
 ) -> RunSettings:
     """Return the settings of a run: defaults, under a file, under options, under assignments.
 
@@ -31,7 +36,7 @@ def choose(
     ----------
     file : of --settings
     assignments : of --set
-    payload : file of --payload
+    payload : the sensor head, or its file; None where a settings file may describe it
     options : nested settings that other options give
 
     Raises
@@ -48,6 +53,29 @@ def choose(
     if payload is not None:
         values[PAYLOAD] = _payload(held, payload, file)
     return validated(RunSettings, values, "--set")
+
+
+def as_run_settings(
+    *,
+    estimator: EstimatorName | None = None,
+    payload: PayloadLike = None,
+    settings: EstimatorSettings | Path | str | None = None,
+    **values: Any,  # noqa: ANN401 - the model checks them
+) -> RunSettings:
+    """Return the settings of a run from the arguments of a call, in which None is the default.
+
+    Parameters
+    ----------
+    settings : of the estimator, or a file as of `--settings`
+    """
+    options = given(estimator=estimator, **values)
+    if isinstance(settings, (str, Path)):
+        return choose(Path(settings), [], payload, options)
+    if settings is not None:
+        name = estimator or RunSettings().estimator
+        require_settings(name, settings)
+        options[name] = settings
+    return choose(None, [], payload, options)
 
 
 def read_settings(path: Path) -> dict[str, Any]:
@@ -121,10 +149,10 @@ def _estimator(held: Mapping[str, Any], asked: str | None, file: Path | None) ->
     return chosen
 
 
-def _payload(held: Mapping[str, Any], path: Path, file: Path | None) -> Payload:
+def _payload(held: Mapping[str, Any], payload: PayloadLike, file: Path | None) -> Payload:
     """Return the sensor head, which a settings file must not describe in another way."""
-    head = Payload.load(path)
+    head = as_payload(payload)
     if PAYLOAD in held and plain(Payload.model_validate(held[PAYLOAD])) != plain(head):
-        msg = f"{file} describes another sensor head than --payload {path}: leave one of them out"
+        msg = f"{file} describes another sensor head than the payload given: leave one of them out"
         raise UsageError(msg)
     return head

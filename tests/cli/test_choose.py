@@ -9,10 +9,10 @@ import pytest
 import yaml
 
 from bentwing.base.errors import InputError, UsageError
-from bentwing.cli.settings_options import changes_of, choose, merged
 from bentwing.odometry import ESTIMATORS
 from bentwing.recording import Payload
 from bentwing.run import pipeline
+from bentwing.run.choose import changes_of, choose, merged
 from bentwing.run.settings import RunSettings
 
 HEAD = """
@@ -195,7 +195,7 @@ def test_settings_reach_the_pipeline(bentwing, called, written, head, command):
         ("", [], 3, "holds no settings; give settings as"),
         ("kalman: {}", ["--estimator", "ndt"], 2, "holds settings of kalman, but the estimator is ndt"),
         ("payload: {lidar: {max_rang: 3}}", [], 3, "payload.lidar: unknown key 'max_rang'; did you"),
-        ("payload: {name: other}", ["-p", "head.yaml"], 2, "another sensor head than --payload"),
+        ("payload: {name: other}", ["-p", "head.yaml"], 2, "another sensor head than the payload"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_used_is_refused_in_one_sentence(

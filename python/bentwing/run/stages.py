@@ -59,17 +59,17 @@ def estimate(job: Job, found: Found, engine: Estimator) -> Found:
     part, counts, spin = job.part, Counter[str](), Spin()
     failure: BaseException | None = None
     open_loop: Estimate | None = None
-    with job.folder.stage("estimate"), job.progress.stage("estimate", part.length) as shown:
-        try:
+    try:
+        with job.folder.stage("estimate"), job.progress.stage("estimate", part.length) as shown:
             for batch in part.batches(shown, counts):
                 engine.feed(batch)
                 spin.watch(batch)
             open_loop = engine.result()
-        except BaseException as error:
-            failure = error
-            if isinstance(error, (EstimationError, KeyboardInterrupt)):
-                with suppress(EstimationError):  # there may be nothing yet
-                    open_loop = engine.so_far()
+    except BaseException as error:
+        failure = error
+        if isinstance(error, (EstimationError, KeyboardInterrupt)):
+            with suppress(EstimationError):  # there may be nothing yet
+                open_loop = engine.so_far()
     reading = Reading(dict(part.recording.counts + counts), list(part.recording.warnings))
     return replace(found, estimate=open_loop, reading=reading, spin=spin, failure=failure)
 
@@ -118,12 +118,12 @@ def close(job: Job, found: Found) -> Found:
 
 def _localize(job: Job, found: Found, prior: PriorMap) -> Found:
     part = job.part
-    with job.folder.stage("localize"), job.progress.stage("localize", part.length) as shown:
-        batches = part.batches(shown, Counter())
-        try:
+    try:
+        with job.folder.stage("localize"), job.progress.stage("localize", part.length) as shown:
+            batches = part.batches(shown, Counter())
             there = find_in_map(_known(found), batches, prior, threads=job.settings.threads)
-        except NotInMapError as error:
-            return replace(found, localization=error.record, failure=error)
+    except NotInMapError as error:
+        return replace(found, localization=error.record, failure=error)
     return replace(found, estimate=there.estimate, localization=there.record)
 
 

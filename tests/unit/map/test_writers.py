@@ -202,6 +202,7 @@ def test_a_truncated_map_is_an_input_error(tmp_path, map_format, share):
 
 
 def test_a_map_of_an_unknown_kind_says_what_is_read(tmp_path):
+    (tmp_path / "map.xyz").write_text("0 0 0\n")
     with pytest.raises(InputError, match=r"\.laz, \.las, \.ply, \.pcd"):
         read_points(tmp_path / "map.xyz")
 

@@ -11,7 +11,7 @@ from typer import Typer
 from typer.testing import CliRunner
 
 from bentwing.base.errors import UsageError
-from bentwing.cli.simulate import simulate_command
+from bentwing.cli.simulate import command
 from bentwing.simulate import Scenario, simulate
 
 ROS2 = get_typestore(Stores.ROS2_HUMBLE)
@@ -93,7 +93,7 @@ def test_a_flight_too_short_to_land_is_refused(tmp_path):
 
 def test_the_command_names_what_it_wrote(tmp_path):
     app = Typer()
-    app.command()(simulate_command)
+    app.command()(command)
     arguments = ["office", "-o", str(tmp_path / "out"), "--head", "hokuyo-nod", "--duration", "10"]
     result = CliRunner().invoke(app, [*arguments, "--event", "gap"], catch_exceptions=False)
     assert result.exit_code == 0

@@ -205,9 +205,7 @@ def test_runs_are_copied_and_pickled(tmp_path, recording):
         assert again.map_path == run.map_path
 
 
-def test_settings_of_a_file_are_those_of_the_run_and_arguments_stand_over_them(
-    tmp_path, recording
-):
+def test_settings_of_a_file_are_those_of_the_run_and_arguments_stand_over_them(tmp_path, recording):
     file = tmp_path / "settings.yaml"
     file.write_text("map_format: ply\nmap_spacing: 5.0\ncontinuous: {window: 4}\n")
     pipeline.map_recording(recording, PAYLOAD, tmp_path / "out", settings=file, map_spacing=4.0)

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
 """Fills `<!-- options: map -->` and `<!-- settings: kalman -->` with tables while the pages are built.
 
-The tables come from the command line and the settings models themselves.
+The tables come from the command line and the settings models themselves. `<!-- settings:
+CleanSettings.moving -->` is a table of one setting.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from pydantic import BaseModel
 from bentwing.base.units import Unit
 from bentwing.cli.command import rank
 from bentwing.cli.commands import load
+from bentwing.closing import MatchSettings, PlaceSettings
 from bentwing.odometry import EstimatorName
 from bentwing.run.settings import RunSettings
 
@@ -23,7 +25,7 @@ if TYPE_CHECKING:
 
     from pydantic.fields import FieldInfo
 
-MARKER = re.compile(r"^<!-- (options|settings): (\w+) -->$", re.MULTILINE)
+MARKER = re.compile(r"^<!-- (options|settings): ([\w.]+) -->$", re.MULTILINE)
 _ESTIMATORS = get_args(EstimatorName)
 _BOUNDS = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤"}
 
@@ -39,14 +41,16 @@ def table(kind: str, name: str) -> str:
     Raises
     ------
     KeyError
-        If there is no command, estimator or settings model of that name.
+        If there is no command, estimator, settings model or setting of that name.
     """
     if kind == "options":
         parameters = sorted(load(name).params, key=lambda one: rank(one.rich_help_panel))
         return _markdown(("option", "default", "meaning"), map(option_row, parameters))
+    name, _, only = name.partition(".")
     model, prefix = settings_models()[name]
+    fields = {only: model.model_fields[only]} if only else model.model_fields
     headings = ("setting", "default", "unit", "range", "meaning")
-    return _markdown(headings, (setting_row(prefix + n, f) for n, f in model.model_fields.items()))
+    return _markdown(headings, (setting_row(prefix + n, f) for n, f in fields.items()))
 
 
 def option_row(parameter: Any) -> tuple[str, ...]:  # noqa: ANN401 - typer hides its own click
@@ -71,7 +75,7 @@ def setting_row(name: str, field: FieldInfo) -> tuple[str, ...]:
         bounds = [f"`{choice}`" for choice in get_args(field.annotation)]
     else:
         bounds = [
-            f"{sign} {getattr(one, attribute):g}"
+            f"{sign}\N{NO-BREAK SPACE}{getattr(one, attribute):g}"
             for attribute, sign in _BOUNDS.items()
             for one in field.metadata
             if getattr(one, attribute, None) is not None
@@ -93,7 +97,7 @@ def settings_models() -> dict[str, tuple[type[BaseModel], str]]:
             if isinstance(field.default, BaseModel):
                 inner = "" if name in _ESTIMATORS else f"{prefix}{name}."
                 found.setdefault(type(field.default).__name__, (type(field.default), inner))
-    return found
+    return found | {model.__name__: (model, "") for model in (PlaceSettings, MatchSettings)}
 
 
 def _default_of(parameter: Any) -> str:  # noqa: ANN401 - typer hides its own click
@@ -118,6 +122,10 @@ def _plain(value: object) -> object:
 
 
 def _markdown(headings: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
-    lines = (" | ".join(cell.replace("|", r"\|") for cell in row) for row in (headings, *rows))
+    """Return a table of the columns that are not empty."""
+    columns = [column for column in zip(headings, *rows, strict=True) if any(column[1:])]
+    lines = (
+        " | ".join(cell.replace("|", r"\|") for cell in row) for row in zip(*columns, strict=True)
+    )
     first, *rest = (f"| {line} |" for line in lines)
-    return "\n".join([first, "|" + "---|" * len(headings), *rest])
+    return "\n".join([first, "|" + "---|" * len(columns), *rest])

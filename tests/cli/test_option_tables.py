@@ -63,9 +63,15 @@ def test_a_table_has_every_setting_of_an_estimator(hook, name):
     assert [row[0].strip("`").removesuffix(".…") for row in rows] == list(model.model_fields)
 
 
+def test_a_table_has_one_setting_and_no_empty_column(hook):
+    text = hook.on_page_markdown("<!-- settings: CleanSettings.moving -->")
+    assert text.startswith("| setting | default | meaning |")
+    assert [row[:2] for row in rows_of(text)] == [["`cleaning.moving`", "`true`"]]
+
+
 def test_a_table_has_default_unit_and_range(hook):
     rows = {row[0]: row[1:] for row in rows_of(hook.table("settings", "kalman"))}
-    assert rows["`scan`"][:3] == ["`0.1`", "s", "≥ 0.02, ≤ 1"]
+    assert rows["`scan`"][:3] == ["`0.1`", "s", "≥\xa00.02, ≤\xa01"]
     assert rows["`rotation`"][:3] == ["`encoder`", "", "`encoder`, `ignored`"]
     surfels = [row[0] for row in rows_of(hook.table("settings", "SurfelSettings"))]
     assert "`surfels.max_gap`" in surfels
@@ -86,7 +92,7 @@ def test_every_marker_of_the_documentation_is_filled_in(hook):
         assert not re.search(r"<!-- *(options|settings)\b", filled), page
 
 
-@pytest.mark.parametrize("marker", ["options: mop", "settings: mop"])
+@pytest.mark.parametrize("marker", ["options: mop", "settings: mop", "settings: CleanSettings.mop"])
 def test_a_marker_of_nothing_stops_the_build(hook, marker):
     with pytest.raises((KeyError, ModuleNotFoundError), match="mop"):
         hook.on_page_markdown(f"<!-- {marker} -->")

@@ -28,5 +28,5 @@ class GeoreferenceSettings(BaseModel):
         description="projected system of the map; default: the UTM zone of the fixes",
     )
     control_points: Path | None = Field(
-        default=None, description="CSV file of surveyed points, see `read_control_points`"
+        default=None, description="CSV file of surveyed control and check points"
     )

@@ -98,7 +98,7 @@ def find_matches(parts: dict[Part, list[Place]], shown: Stage | None = None) -> 
 def _between(a: Part, b: Part, of_a: Sequence[Place], of_b: Sequence[Place]) -> list[Match]:
     most = MatchSettings().max_candidates
     n = int(np.clip(_TRIED // max(len(of_a), len(of_b)), _FEWEST_CANDIDATES, most))
-    settings = replace(MatchSettings(), max_candidates=n)
+    settings = MatchSettings(max_candidates=n)
     return [
         Match(a, b, c, of_a[c.i], of_b[c.j], c.reason)
         for c in match_places(of_a, of_b, settings=settings)
@@ -120,7 +120,7 @@ def consistent(matches: Sequence[Match]) -> list[Match]:
     if group.contested:
         for k in believed:
             result[k] = matches[k].rejected(
-                "contradicts another match of these two, and nothing tells which one is right"
+                "contradicts another match of these two, and nothing shows which one is right"
             )
         return result
     for row in np.flatnonzero(~kept):

@@ -79,11 +79,11 @@ def test_matching_is_the_same_every_time_and_in_both_directions(places_a, places
     [
         ({"min_votes": 1e6}, "votes"),
         ({"min_inliers": 1000}, "keypoints agree"),
-        ({"min_overlap": 1.1}, "overlap"),
-        ({"min_agreement": 1.1}, "agreement"),
-        ({"max_distance": 0.0}, "planes are"),
+        ({"min_overlap": 1.0}, "overlap"),
+        ({"min_agreement": 1.0}, "agreement"),
+        ({"max_distance": 1e-6}, "planes are"),
         ({"min_conditioning": 1.0}, "conditioning"),
-        ({"max_conflict": -0.1}, "saw through"),
+        ({"max_conflict": 0.0}, "saw through"),
     ],
 )
 def test_every_check_names_itself_when_it_rejects(places_a, places_b, change, words):

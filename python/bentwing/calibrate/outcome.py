@@ -34,7 +34,7 @@ ONE_RATE = (
     "revolution in each direction, or at two rates"
 )
 NO_MOTION = (
-    "the mount of the IMU and the lidar's latency against it: at rest nothing tells them; record "
+    "the mount of the IMU and the lidar's latency against it: at rest nothing shows them; record "
     "half a minute of motion with turns about all axes"
 )
 

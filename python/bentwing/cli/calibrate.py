@@ -27,7 +27,7 @@ def command(
     """Calibrate a sensor head: payload.yaml with standard deviations, and a wall before and after.
 
     A motor-turned lidar needs one revolution at a constant rate with the carrier at rest in any room;
-    the IMU's mount and the latency are seen in motion.
+    the mount of the IMU and the latency need motion.
     """
     # slow to import, so only when it is needed
     from rich.console import Console

@@ -15,11 +15,11 @@ from bentwing.cli.mistakes import did_you_mean
 # What the list of commands says about each; the command is `bentwing.cli.<name>.command`.
 COMMANDS = {
     "map": "Turn a recording into a trajectory, a map and a report.",
-    "localize": "Find a recording in a map, and what has changed.",
+    "localize": "Find a recording in a map, and report what has changed.",
     "merge": "Put several runs into one map.",
-    "info": "Tell whether a recording is fit for mapping.",
+    "info": "Check whether a recording is fit for mapping.",
     "calibrate": "Calibrate a sensor head: motor, IMU and clocks.",
-    "plan": "Plan a flight: how fast to spin, what will be seen.",
+    "plan": "Plan a flight: spin rate, point spacing, coverage.",
     "evaluate": "Measure the errors of a trajectory and a map.",
     "view": "Show a run: map, path and windows over time.",
     "simulate": "Simulate a recording with truth.",

@@ -15,7 +15,7 @@ EXAMPLES = (
 def command(
     recording: options.Recording, *, payload: options.Payload = None, as_json: options.Json = False
 ) -> None:
-    """Tell topics, rates, gaps, spin, stalls and visible structure, and whether mapping can work."""
+    """Check a recording: topics, rates, gaps, spin, stalls and visible structure, with a verdict."""
     # slow to import, so only when it is needed
     import dataclasses
     import json

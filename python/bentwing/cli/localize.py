@@ -39,7 +39,7 @@ def command(
     resume: options.Resume = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Find a recording in a map without a guess, and tell what has changed.
+    """Find a recording in a map without a guess, and report what has changed.
 
     Writes what `bentwing map` does, in the frame of the map, and the points that have appeared and
     disappeared since.
@@ -50,7 +50,7 @@ def command(
     from bentwing.run.choose import choose, given
     from bentwing.run.pipeline import run_recording
 
-    asked = given(
+    options_given = given(
         estimator=estimator,
         map_format=map_format,
         map_spacing=map_spacing,
@@ -60,7 +60,7 @@ def command(
         start=start,
         duration=duration,
     )
-    chosen = choose(settings, set_, payload, asked)
+    chosen = choose(settings, set_, payload, options_given)
     progress = create_progress(quiet=quiet)
     run_recording(recording, out, chosen, payload, resume=resume, progress=progress)
     if not quiet:

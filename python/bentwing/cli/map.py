@@ -65,7 +65,7 @@ def command(
     from bentwing.run.flights import map_flights
     from bentwing.run.pipeline import run_recording
 
-    asked = given(
+    options_given = given(
         estimator=estimator,
         map_format=map_format,
         map_spacing=map_spacing,
@@ -76,7 +76,7 @@ def command(
         start=start,
         duration=duration,
     )
-    chosen = choose(settings, set_, payload, asked)
+    chosen = choose(settings, set_, payload, options_given)
     if print_settings:
         typer.echo(chosen.to_yaml(), nl=False)
         return

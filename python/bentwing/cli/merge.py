@@ -32,7 +32,7 @@ def command(
     threads: options.Threads = None,
     quiet: options.Quiet = False,
 ) -> None:
-    """Put several runs into one map, without a guess where they lie.
+    """Put several runs into one map, without a guess of their relative poses.
 
     Runs that have no place in common become maps of their own, in folders of their own.
     """

@@ -53,10 +53,10 @@ Recording = Annotated[
 ]
 Payload = Annotated[Path | None, payload()]
 Start = Annotated[
-    float | None, option(INPUT, metavar="SECONDS", min=0, help="Skip so much at the start.")
+    float | None, option(INPUT, metavar="SECONDS", min=0, help="Time to skip at the start.")
 ]
 Duration = Annotated[
-    float | None, option(INPUT, metavar="SECONDS", min=0, help="Use so much of the recording.")
+    float | None, option(INPUT, metavar="SECONDS", min=0, help="Length of the part to use.")
 ]
 
 Out = Annotated[Path, out()]
@@ -147,7 +147,7 @@ Threads = Annotated[
         metavar="N",
         min=1,
         show_default="all cores",
-        help="Use so many threads; the result does not depend on it.",
+        help="Number of threads; the result does not depend on it.",
     ),
 ]
 Resume = Annotated[

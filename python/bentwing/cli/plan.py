@@ -24,12 +24,16 @@ def command(  # noqa: PLR0917 - one parameter per option
             rich_help_panel=INPUT,
         ),
     ],
-    distance: Annotated[float, option(INPUT, metavar="METRES", help="To the structure.")] = 5.0,
-    speed: Annotated[float, option(INPUT, metavar="M/S", help="Of the carrier.")] = 2.0,
+    distance: Annotated[
+        float, option(INPUT, metavar="METRES", help="Distance from the structure.")
+    ] = 5.0,
+    speed: Annotated[float, option(INPUT, metavar="M/S", help="Speed of the carrier.")] = 2.0,
     voxel_size: Annotated[
-        float, option(INPUT, metavar="METRES", help="Of the finest surfels.")
+        float, option(INPUT, metavar="METRES", help="Edge of the finest voxels.")
     ] = 0.4,
-    window: Annotated[float, option(INPUT, metavar="SECONDS", help="Of the estimator.")] = 5.0,
+    window: Annotated[
+        float, option(INPUT, metavar="SECONDS", help="Length of the estimator's window.")
+    ] = 5.0,
     scan_rate: Annotated[
         float | None,
         option(INPUT, metavar="HZ", help="Sweeps per second.", show_default="of the lidar's kind"),
@@ -43,8 +47,10 @@ def command(  # noqa: PLR0917 - one parameter per option
             show_default="of the lidar's kind",
         ),
     ] = None,
-    area: Annotated[float, option(INPUT, metavar="M²", help="Of the site.")] = 2500.0,
-    flight_time: Annotated[float, option(INPUT, metavar="MINUTES", help="Of one battery.")] = 10.0,
+    area: Annotated[float, option(INPUT, metavar="M²", help="Size of the site.")] = 2500.0,
+    flight_time: Annotated[
+        float, option(INPUT, metavar="MINUTES", help="Flight time of one battery.")
+    ] = 10.0,
     picture: Annotated[
         Path | None,
         option(RESULT, metavar="FILE", help="Write a map of what the head sees as SVG."),
@@ -52,7 +58,7 @@ def command(  # noqa: PLR0917 - one parameter per option
     *,
     as_json: options.Json = False,
 ) -> None:
-    """Tell acceptable spin rates, point spacing, coverage and flight time for this head."""
+    """Compute acceptable spin rates, point spacing, coverage and flight time for this head."""
     # slow to import, so only when it is needed
     import json
     import math

@@ -91,7 +91,7 @@ def _spin(plan: Plan) -> Iterator[str]:
         f"{intent.window:g} s"
     )
     yield (
-        f"           at least {rates['reobservation']:.0f} °/s: {intent.distance / 2:g} m of way "
+        f"           at least {rates['reobservation']:.0f} °/s: {intent.distance / 2:g} m of path "
         f"between two views at {intent.speed:g} m/s"
     )
 

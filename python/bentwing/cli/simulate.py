@@ -65,7 +65,9 @@ def command(
     ] = None,
     speed: Annotated[
         float | None,
-        option(WORLD, metavar="M/S", help="About, of a tour.", show_default="the scene's"),
+        option(
+            WORLD, metavar="M/S", help="Approximate speed of a tour.", show_default="the scene's"
+        ),
     ] = None,
     head: Annotated[
         HeadName | None,
@@ -78,7 +80,7 @@ def command(
     motor_rate: Annotated[float, option(HEAD, metavar="RAD/S", help="Rate of vlp16-motor.")] = 1.0,
     spin: Annotated[
         SpinName,
-        option(HEAD, help="Of hokuyo-spin: plant is downdraft, vanes and controller."),
+        option(HEAD, help="Spin of hokuyo-spin; plant simulates downdraft, vanes and controller."),
     ] = "steady",
     max_range: Annotated[
         float | None,
@@ -106,7 +108,11 @@ def command(
     ] = False,
     bag_format: Annotated[
         RecordingFormat,
-        option(RESULT, "--format", help="bag is of ROS 1, mcap and db3 are of ROS 2."),
+        option(
+            RESULT,
+            "--format",
+            help="Format of the recording: bag for ROS 1, mcap and db3 for ROS 2.",
+        ),
     ] = "bag",
     quiet: options.Quiet = False,
 ) -> None:

@@ -167,7 +167,7 @@ def _drift(estimate: Trajectory, odometry: Trajectory | None, result: Evaluation
         return
     lengths = drift_boxes(drifting, reference)
     if not lengths:
-        result.notes.append("the way is too short for a distribution of drift")
+        result.notes.append("the path is too short for a distribution of drift")
     result.drift = DriftOver(name, against, lengths)
 
 

@@ -85,7 +85,7 @@ def _maps(flown: dict[str, Flown], scene: str, name: str, title: str, what: str)
                 f"{name}{letter}",
                 oblique_map(_near(result.points, path), path, ceiling),
                 f"{title}{letter}",
-                f"{what}, mapped by {trial} with a lidar that is {lidar}; the way by time.",
+                f"{what}, mapped by {trial} with a lidar that is {lidar}; the path by time.",
             )
         )
     return figures

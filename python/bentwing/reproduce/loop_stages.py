@@ -68,8 +68,8 @@ def loop_figures(
         stages = loop_stages(flown)
     names = (
         ("a", stages.drifted, "Open loop, with drift put in: 12° and 1.4 m by the end."),
-        ("b", stages.linked, f"After place recognition: {stages.n_links} pairs of places, of which "
-         f"{stages.n_false} were not believed."),
+        ("b", stages.linked, f"After place recognition: {stages.n_links} pairs of places; "
+         f"{stages.n_false} of them were rejected."),
         ("c", stages.closed, "After global registration."),
     )  # fmt: skip
     figures, errors = [], []

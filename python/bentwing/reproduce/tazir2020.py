@@ -43,7 +43,7 @@ _PAPER_RTE = {"town, 0.5 rad/s": "0.467", "town, 1 rad/s": "0.801", "town, fixed
 _PAPER_RMSE = {"town, 0.5 rad/s": "0.135", "town, 1 rad/s": "0.223"}
 _PAPER_FAR = {"town, 0.5 rad/s": "about 100", "town, fixed": "20 (10 m off)"}
 _NOTE = (
-    "RTE and RRE are the errors of poses of which the first is given (equations 8 and 9); ATE is the root mean "
+    "RTE and RRE are the errors of poses with the first one given (equations 8 and 9); ATE is the root mean "
     "square after aligning the whole. The registration's RMSE is the distance of the points of a scan from "
     "the surfaces of the keyframes. `ndt` sees what the paper's odometry sees: the lidar and the motor's angle "
     "(its map is levelled by the IMU, which no error here depends on). `continuous` also has the IMU, runs open "

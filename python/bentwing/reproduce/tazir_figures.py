@@ -46,14 +46,14 @@ def _town_maps(flown: dict[str, Flown]) -> list[Figure]:
     found, georeferenced = (_near(p, path) for p in (slow.results["ndt"].points, fixed.true_points))
     share = {n: _covered(p, path) for n, p in (("turning", found), ("fixed", georeferenced))}
     return [
-        Figure("fig04", oblique_map(found, path), "Fig. 4", "Map by `ndt` of the turning lidar, with the way."),
+        Figure("fig04", oblique_map(found, path), "Fig. 4", "Map by `ndt` of the turning lidar, with the path."),
         Figure("fig09", oblique_map(georeferenced, path), "Fig. 9", "Map of the fixed lidar, made with the true poses."),
         Figure(
             "fig10",
             _overlay(georeferenced, found),
             "Fig. 10",
             "Both from above: blue from true poses and the fixed lidar, red from the odometry of the turning one. "
-            f"Within 40 m of the way {100 * share['turning']:.0f} % of the square metres have a point with the turning "
+            f"Within 40 m of the path {100 * share['turning']:.0f} % of the square metres have a point with the turning "
             f"lidar, {100 * share['fixed']:.0f} % with the fixed one.",
         ),
         Figure("section52", map_from_above(_near(fixed.results["ndt"].points, path), path), "Section 5.2", "What `ndt` makes of the fixed lidar."),
@@ -169,7 +169,7 @@ def _dam(flown: dict[str, Flown]) -> list[Figure]:
     path = turning.truth.positions[::50]
     return [
         Figure("fig15", oblique_map(_near(turning.results["ndt"].points, path, 150.0), path), "Fig. 15", "The dam, by `ndt` with the turning lidar at 70 m and 4 m/s."),
-        Figure("section561", oblique_map(_near(fixed.results["ndt"].points, path, 150.0), path), "Section 5.6.1", "The same with the fixed lidar, of which the paper's odometry made no map."),
+        Figure("section561", oblique_map(_near(fixed.results["ndt"].points, path, 150.0), path), "Section 5.6.1", "The same with the fixed lidar, from which the paper's odometry made no map."),
     ]  # fmt: skip
 
 

@@ -180,7 +180,7 @@ def _from_pairs(positions: Positions) -> Placement:
         if best is None or misfit < best[0]:
             best = misfit, tried
     if best is None:
-        msg = "all GNSS fixes are at one place; the heading of the map cannot be told"
+        msg = "all GNSS fixes are at one position; they do not determine the heading of the map"
         raise NotEnoughDataError(msg)
     return best[1]
 

@@ -107,7 +107,7 @@ class Site:
         if placement.std[0] > MAX_HEADING_STD:
             msg = (
                 f"the GNSS fixes give the heading of the map to {np.degrees(placement.std[0]):.1f}° "
-                "only: the way is too short for their noise"
+                "only: the path is too short for their noise"
             )
             raise NotEnoughDataError(msg)
         return placement, used

@@ -90,8 +90,8 @@ def _unplaced(prior: PriorMap, places: Sequence[Place], candidates: Sequence[Can
     n = sum(c.accepted for c in candidates)
     if n:
         return (
-            f"{prior.path}: {n} places of the recording contradict each other on where it is in the map, "
-            "and nothing tells which are right; record a longer part of the site"
+            f"{prior.path}: {n} places of the recording contradict each other on its pose in the map, "
+            "and nothing shows which are right; record a longer part of the site"
         )
     return (
         f"{prior.path}: none of the {len(places)} places of the recording was recognized among "

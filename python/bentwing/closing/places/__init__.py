@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""Places of runs, recognized in each other without a guess where they lie.
+"""Places of runs, recognized in each other without a guess of their relative poses.
 
 A run is cut into places; each is described at keypoints; similar descriptors vote for pairs of
 places; the pairs with votes are verified by their geometry. Whatever was considered is listed, with

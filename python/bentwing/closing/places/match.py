@@ -67,7 +67,7 @@ def match_places(
     settings: MatchSettings | None = None,
     metric: Metric | None = None,
 ) -> list[Candidate]:
-    """Find the places of run b that are places of run a too, without a guess where they lie.
+    """Find the places of run b that are places of run a too, without a guess of their relative poses.
 
     Parameters
     ----------

@@ -261,7 +261,7 @@ class Odometry:
             Without `usual_rate`.
         """
         if self._spin is None:
-            msg = "a stall is told from the usual rate: Odometry(..., usual_rate=...) in rad/s"
+            msg = "a stall is a drop from the usual rate: give it as Odometry(..., usual_rate=...), rad/s"
             raise UsageError(msg)
         return self._spin.stall
 

@@ -53,7 +53,7 @@ def check_pcap(path: Path) -> None:
         raise RecordingError(msg) from None
     if head[:4] == PCAPNG:
         msg = (
-            f"{path}: a capture in the pcapng format, of which only the older pcap can be read; "
+            f"{path}: a capture in the pcapng format, but bentwing reads the older pcap only; "
             f"convert it with `editcap -F pcap {path.name} {path.stem}-old.pcap`"
         )
         raise RecordingError(msg)

@@ -109,8 +109,8 @@ def _warnings(group: Placed, found: Ingredients) -> list[str]:
         if len(links) == 1:
             other = ({links[0].a.run, links[0].b.run} - {run}).pop()
             told.append(
-                f"{sources[run].name} is joined by a single place, with {sources[other].name}: look "
-                "whether the map is as it should be there"
+                f"{sources[run].name} is joined by a single place, with {sources[other].name}: "
+                "check the map there"
             )
     return told
 
@@ -128,8 +128,8 @@ def _separate_maps(
             maps.append(_one_map(own, group, found, one))
     told = ", ".join(f"{one['folder']} ({', '.join(one['runs'])})" for one in described)
     note = (
-        "not all of the runs have places in common that could be recognised: they are "
-        f"{len(groups)} separate maps, {told}, and where these lie relative to each other is unknown"
+        "bentwing did not recognize common places of all runs: they are "
+        f"{len(groups)} separate maps, {told}, and their relative poses are unknown"
     )
     folder.record.found = Found(merging={**found.record, "maps": described}, notes=(note,))
     report_run(folder, folder.record.found)

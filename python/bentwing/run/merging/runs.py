@@ -55,7 +55,7 @@ def merge(
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> Merged:
-    """Merge runs into one map, without a guess where they lie.
+    """Merge runs into one map, without a guess of their relative poses.
 
     Places that several runs saw are recognised, a robust pose graph puts the runs together, and one
     non-rigid registration corrects all of them and their calibrations at once (Kaul 2015, section

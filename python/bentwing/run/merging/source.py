@@ -100,8 +100,8 @@ def open_source(folder: Path, name: str) -> Source:
     record = require_single(folder, read_record(folder))
     if not record.get("recordings") or record.get("start_ns") is None:
         msg = (
-            f"{folder}: run.json does not say where the recording lies, as those of earlier versions; "
-            "map it again"
+            f"{folder}: run.json does not name the recording, as those of earlier versions; map it "
+            "again"
         )
         raise UsageError(msg)
     recordings = [Path(path) for path in record["recordings"]]

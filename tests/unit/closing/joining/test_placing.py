@@ -62,7 +62,7 @@ def test_a_match_that_contradicts_the_others_is_rejected_with_the_number(corrido
 def test_two_matches_that_contradict_each_other_are_both_rejected(corridor):
     judged = consistent([corridor.match(0, 0), corridor.match(3, 3, (0.0, 5.0, 0.0))])
     assert not any(m.believed for m in judged)
-    assert "nothing tells which one is right" in judged[0].reason
+    assert "nothing shows which one is right" in judged[0].reason
     groups, _ = placed(corridor, judged)
     assert len(groups) == 2
 

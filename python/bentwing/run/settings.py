@@ -36,12 +36,16 @@ class MapSettings(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
-    map_format: MapFormat = Field("laz", description="file format of the map")
+    map_format: MapFormat = Field(default="laz", description="file format of the map")
     map_spacing: Metres = Field(
-        0.0, ge=0, description="edge of the voxels that keep one point each; 0 keeps all points"
+        default=0.0,
+        ge=0,
+        description="edge of the voxels that keep one point each; 0 keeps all points",
     )
-    cleaning: CleanSettings = Field(CleanSettings(), description="what the map leaves out")
-    threads: int | None = Field(None, ge=1, description="number of threads; default: all cores")
+    cleaning: CleanSettings = Field(default=CleanSettings(), description="what the map leaves out")
+    threads: int | None = Field(
+        default=None, ge=1, description="number of threads; default: all cores"
+    )
 
     @field_validator("map_format", mode="before")
     @classmethod
@@ -58,13 +62,13 @@ class MapSettings(BaseModel):
 class MergeSettings(MapSettings):
     """What decides a merged map."""
 
-    runs: tuple[Path, ...] = Field((), description="folders of the runs")
+    runs: tuple[Path, ...] = Field(default=(), description="folders of the runs")
     flights: dict[str, tuple[Path, ...]] = Field(
         default_factory=dict,
         description="files of each flight by its name, where the flights are mapped first",
     )
     loop_closure: GlobalSettings = Field(
-        GlobalSettings(), description="how the runs are registered with each other"
+        default=GlobalSettings(), description="how the runs are registered with each other"
     )
 
 
@@ -74,25 +78,30 @@ class RunSettings(MapSettings):
     `continuous`, `kalman` and `ndt` are the settings of the estimators; those of `estimator` count.
     """
 
-    estimator: EstimatorName = Field("continuous", description="name of the estimator")
+    estimator: EstimatorName = Field(default="continuous", description="name of the estimator")
     georeferencing: GeoreferenceSettings = Field(
-        GeoreferenceSettings(), description="how GNSS fixes and control points are used"
+        default=GeoreferenceSettings(), description="how GNSS fixes and control points are used"
     )
     loop_closure: GlobalSettings | Literal[False] = Field(
-        GlobalSettings(), description="how loops are closed; false leaves the trajectory open-loop"
+        default=GlobalSettings(),
+        description="how loops are closed; false leaves the trajectory open-loop",
     )
-    prior_map: Path | None = Field(None, description="map in which the recording is localized")
+    prior_map: Path | None = Field(
+        default=None, description="map in which the recording is localized"
+    )
     start: Annotated[float | None, Unit("s")] = Field(
-        None, ge=0, description="time to skip at the start of the recording"
+        default=None, ge=0, description="time to skip at the start of the recording"
     )
     duration: Annotated[float | None, Unit("s")] = Field(
-        None, ge=0, description="length of the part to use; default: all of the recording"
+        default=None, ge=0, description="length of the part to use; default: all of the recording"
     )
     continuous: ContinuousSettings = Field(
-        ContinuousSettings(), description="settings of the continuous estimator"
+        default=ContinuousSettings(), description="settings of the continuous estimator"
     )
-    kalman: KalmanSettings = Field(KalmanSettings(), description="settings of the Kalman filter")
-    ndt: NdtSettings = Field(NdtSettings(), description="settings of the NDT odometry")
+    kalman: KalmanSettings = Field(
+        default=KalmanSettings(), description="settings of the Kalman filter"
+    )
+    ndt: NdtSettings = Field(default=NdtSettings(), description="settings of the NDT odometry")
     payload: Payload = Field(default_factory=Payload.default, description="the sensor head")
 
     @field_validator("estimator", mode="before")

@@ -17,7 +17,7 @@ class GeoreferenceSettings(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     mode: GeoreferenceMode = Field(
-        "rigid",
+        default="rigid",
         description="`rigid` turns the map about the vertical and shifts it, and leaves its shape alone; "
         "`constraints` also bends the trajectory towards the fixes and control points, as far as it may "
         "have drifted: choose it for long flights with good fixes; `off` ignores them",

@@ -17,40 +17,42 @@ class GlobalSettings(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     knot_interval: Seconds = Field(
-        1.0,
+        default=1.0,
         gt=0,
         description="time between knots of the correction spline; the windows have settled what is "
         "faster",
     )
     max_knots: int = Field(
-        1000, ge=4, description="most knots in all; long recordings get a longer interval"
+        default=1000, ge=4, description="most knots in all; long recordings get a longer interval"
     )
     stretch: Seconds = Field(
-        5.0, gt=0, description="length of the data that is matched as one visit of a place"
+        default=5.0, gt=0, description="length of the data that is matched as one visit of a place"
     )
     n_visits: int = Field(
-        8, ge=0, description="number of other visits that each stretch is matched with"
+        default=8, ge=0, description="number of other visits that each stretch is matched with"
     )
     min_overlap: float = Field(
-        0.15,
+        default=0.15,
         gt=0,
         lt=1,
         description="least share of a stretch's places that another visit must have seen",
     )
     max_match_distance: float = Field(
-        0.6, gt=0, le=1, description="largest distance of a match in feature space"
+        default=0.6, gt=0, le=1, description="largest distance of a match in feature space"
     )
-    max_outer: int = Field(8, ge=1, description="most outer iterations")
+    max_outer: int = Field(default=8, ge=1, description="most outer iterations")
     min_translation: Metres = Field(
-        1e-3, gt=0, description="smaller steps of the position end the iterations"
+        default=1e-3, gt=0, description="smaller steps of the position end the iterations"
     )
     min_rotation: Radians = Field(
-        1e-4, gt=0, description="smaller steps of the rotation end the iterations"
+        default=1e-4, gt=0, description="smaller steps of the rotation end the iterations"
     )
     memory_mb: Annotated[float, Unit("MB")] = Field(
-        2000.0, gt=0, description="memory of surfels and equations; surfels are thinned to fit"
+        default=2000.0,
+        gt=0,
+        description="memory of surfels and equations; surfels are thinned to fit",
     )
-    surfels: SurfelSettings = Field(SurfelSettings(), description="what makes a surfel")
+    surfels: SurfelSettings = Field(default=SurfelSettings(), description="what makes a surfel")
 
     def interval_for(self, seconds: float) -> float:
         """Return the knot interval, s, of a recording of this length.

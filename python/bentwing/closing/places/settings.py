@@ -14,22 +14,24 @@ class PlaceSettings(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     duration: Seconds = Field(
-        10.0,
+        default=10.0,
         gt=0,
         description="duration of a place, short enough for the drift within it to be small",
     )
     tile: Metres = Field(
-        30.0,
+        default=30.0,
         gt=0,
         description="edge of the tiles of clouds without times, and the farthest that a carrier goes "
         "within a place",
     )
     max_points: int = Field(
-        200_000, ge=1, description="most points of a place; of more, every n-th is taken"
+        default=200_000, ge=1, description="most points of a place; of more, every n-th is taken"
     )
-    voxel: Metres = Field(0.3, gt=0, description="voxel of the averaged cloud")
-    surfel: Metres = Field(0.5, gt=0, description="voxel of the surfels that verify matches")
-    n_keypoints: int = Field(400, ge=1, description="number of keypoints of a place")
+    voxel: Metres = Field(default=0.3, gt=0, description="voxel of the averaged cloud")
+    surfel: Metres = Field(
+        default=0.5, gt=0, description="voxel of the surfels that verify matches"
+    )
+    n_keypoints: int = Field(default=400, ge=1, description="number of keypoints of a place")
 
 
 class MatchSettings(BaseModel):
@@ -37,58 +39,72 @@ class MatchSettings(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
-    n_neighbours: int = Field(5, ge=1, description="number of a descriptor's neighbours that vote")
-    min_votes: float = Field(8.0, ge=0, description="least votes that make two places a candidate")
+    n_neighbours: int = Field(
+        default=5, ge=1, description="number of a descriptor's neighbours that vote"
+    )
+    min_votes: float = Field(
+        default=8.0, ge=0, description="least votes that make two places a candidate"
+    )
     max_candidates: int = Field(
-        8, ge=1, description="most candidates of a place, those with the most votes"
+        default=8, ge=1, description="most candidates of a place, those with the most votes"
     )
     n_hypotheses: int = Field(
-        40,
+        default=40,
         ge=1,
         description="number of transforms per candidate that are checked quickly, those on which most "
         "matches agree",
     )
-    n_refined: int = Field(6, ge=1, description="number of these that are refined, the best ones")
-    min_inliers: int = Field(4, ge=1, description="least number of keypoints that agree")
+    n_refined: int = Field(
+        default=6, ge=1, description="number of these that are refined, the best ones"
+    )
+    min_inliers: int = Field(default=4, ge=1, description="least number of keypoints that agree")
     min_overlap: float = Field(
-        0.25, ge=0, le=1, description="least share of the smaller place that the other one has too"
+        default=0.25,
+        ge=0,
+        le=1,
+        description="least share of the smaller place that the other one has too",
     )
     min_agreement: float = Field(
-        0.7,
+        default=0.7,
         ge=0,
         le=1,
         description="least share, of what both could see, that both saw alike; 0.05 less without planes, "
         "because leaves differ from every side",
     )
     min_sure_agreement: float = Field(
-        0.8,
+        default=0.8,
         ge=0,
         le=1,
         description="the same where less than `wide_overlap` is shared, where it is unknown what beams of "
         "both passed through, and where no other match says the same; 0.05 more without planes",
     )
     wide_overlap: float = Field(
-        0.35,
+        default=0.35,
         ge=0,
         le=1,
         description="share of the smaller place from which `min_agreement` is enough",
     )
     max_conflict: float = Field(
-        0.006,
+        default=0.006,
         ge=0,
         le=1,
         description="largest share of what one place saw where beams of the other passed through; "
         "separates what is built alike but furnished differently",
     )
     max_leafy_conflict: float = Field(
-        0.03, ge=0, le=1, description="the same without planes: leaves let some beams through"
+        default=0.03,
+        ge=0,
+        le=1,
+        description="the same without planes: leaves let some beams through",
     )
     max_distance: Metres = Field(
-        0.025,
+        default=0.025,
         gt=0,
         description="largest median distance across the planes of surfels near each other; of all checks "
         "the hardest to pass for places that are built alike, and the first to widen for a poor sensor",
     )
     min_conditioning: float = Field(
-        0.01, ge=0, description="least eigenvalue of the alignment's information, per surfel"
+        default=0.01,
+        ge=0,
+        description="least eigenvalue of the alignment's information, per surfel",
     )

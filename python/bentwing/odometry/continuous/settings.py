@@ -19,29 +19,33 @@ class SurfelSettings(_Section):
     """What makes a surfel (Kaul 2015, section 2.1)."""
 
     voxel_size: Metres = Field(
-        0.4, gt=0, description="edge of the finest voxels; each further level doubles it"
+        default=0.4, gt=0, description="edge of the finest voxels; each further level doubles it"
     )
-    n_levels: int = Field(4, ge=1, le=8, description="number of voxel levels")
+    n_levels: int = Field(default=4, ge=1, le=8, description="number of voxel levels")
     max_gap: Seconds = Field(
-        0.08, gt=0, description="pause beyond which a voxel's points are split"
+        default=0.08, gt=0, description="pause beyond which a voxel's points are split"
     )
-    max_span: Seconds = Field(0.3, gt=0, description="longest time in a surfel")
-    min_points: int = Field(6, ge=4, description="fewest points of a surfel")
+    max_span: Seconds = Field(default=0.3, gt=0, description="longest time in a surfel")
+    min_points: int = Field(default=6, ge=4, description="fewest points of a surfel")
     min_planarity: float = Field(
-        0.3, ge=0, le=1, description="least 2 (λ2 - λ1) / (λ1 + λ2 + λ3) of a surfel"
+        default=0.3, ge=0, le=1, description="least 2 (λ2 - λ1) / (λ1 + λ2 + λ3) of a surfel"
     )
-    min_width_ratio: float = Field(0.03, ge=0, le=1, description="least λ2 / λ3 of a surfel")
+    min_width_ratio: float = Field(
+        default=0.03, ge=0, le=1, description="least λ2 / λ3 of a surfel"
+    )
     min_width: float = Field(
-        0.05, ge=0, description="least √λ2 of a surfel, in voxels; rejects single scan lines"
+        default=0.05,
+        ge=0,
+        description="least √λ2 of a surfel, in voxels; rejects single scan lines",
     )
     min_incidence_cosine: float = Field(
-        0.1,
+        default=0.1,
         ge=0,
         lt=1,
         description="least cosine between normal and ray; rejects the plane of the scan itself",
     )
     max_rate: Annotated[float, Unit("1/s")] = Field(
-        1500.0, gt=0, description="most surfels per second of data"
+        default=1500.0, gt=0, description="most surfels per second of data"
     )
 
 
@@ -49,68 +53,74 @@ class RegistrationSettings(_Section):
     """How a window is registered (Kaul 2015, section 2.1)."""
 
     knot_interval: Seconds = Field(
-        0.2, gt=0, description="time between knots of the correction spline"
+        default=0.2, gt=0, description="time between knots of the correction spline"
     )
     n_neighbors: int = Field(
-        2, ge=1, description="nearest neighbours that a surfel is matched with"
+        default=2, ge=1, description="nearest neighbours that a surfel is matched with"
     )
     max_match_distance: float = Field(
-        1.0, gt=0, le=1, description="largest distance of a match in feature space"
+        default=1.0, gt=0, le=1, description="largest distance of a match in feature space"
     )
-    min_match_gap: Seconds = Field(0.3, ge=0, description="least difference in time of a match")
+    min_match_gap: Seconds = Field(
+        default=0.3, ge=0, description="least difference in time of a match"
+    )
     first_cauchy_scale: float = Field(
-        3.0,
+        default=3.0,
         gt=0,
         description="scale of the robust loss in the first outer iteration, in standard deviations",
     )
-    cauchy_scale: float = Field(1.0, gt=0, description="the same in later outer iterations")
+    cauchy_scale: float = Field(default=1.0, gt=0, description="the same in later outer iterations")
     max_outer: int = Field(
-        20, ge=1, description="most outer iterations; a window that follows a gap needs many"
+        default=20,
+        ge=1,
+        description="most outer iterations; a window that follows a gap needs many",
     )
-    n_inner: int = Field(1, ge=1, description="solutions per outer iteration")
+    n_inner: int = Field(default=1, ge=1, description="solutions per outer iteration")
     min_translation: Metres = Field(
-        2e-3, gt=0, description="smaller steps of the position end the iterations"
+        default=2e-3, gt=0, description="smaller steps of the position end the iterations"
     )
     min_rotation: Radians = Field(
-        2e-4, gt=0, description="smaller steps of the rotation end the iterations"
+        default=2e-4, gt=0, description="smaller steps of the rotation end the iterations"
     )
     velocity_sigma: Annotated[float, Unit("m/s")] = Field(
-        0.5, gt=0, description="expected deviation of the velocity from the prior"
+        default=0.5, gt=0, description="expected deviation of the velocity from the prior"
     )
     rate_sigma: Annotated[float, Unit("rad/s")] = Field(
-        0.5, gt=0, description="expected deviation of the angular rate from the prior"
+        default=0.5, gt=0, description="expected deviation of the angular rate from the prior"
     )
     motion_accel_density: Annotated[float, Unit("m/s²/√Hz")] = Field(
-        1.5, gt=0, description="how hard the carrier accelerates, where no IMU says it"
+        default=1.5, gt=0, description="how hard the carrier accelerates, where no IMU says it"
     )
     motion_angular_density: Annotated[float, Unit("rad/s²/√Hz")] = Field(
-        1.0, gt=0, description="the same of rotation"
+        default=1.0, gt=0, description="the same of rotation"
     )
 
 
 class ContinuousSettings(_Section):
     """The sliding window of the continuous estimator."""
 
-    window: Seconds = Field(5.0, gt=0, description="length of the sliding window")
-    shift: Seconds = Field(1.5, gt=0, description="new data per step of the window")
+    window: Seconds = Field(default=5.0, gt=0, description="length of the sliding window")
+    shift: Seconds = Field(default=1.5, gt=0, description="new data per step of the window")
     window_without_imu: Seconds = Field(
-        2.0, gt=0, description="length of the window without an IMU"
+        default=2.0, gt=0, description="length of the window without an IMU"
     )
     shift_without_imu: Seconds = Field(
-        0.2,
+        default=0.2,
         gt=0,
         description="new data per step without an IMU: how long velocities are extrapolated",
     )
-    view_length: Seconds = Field(1.5, gt=0, description="length of a fixed view")
-    view_distance: Metres = Field(1.5, gt=0, description="motion that renews the fixed views")
-    n_views: int = Field(5, ge=0, description="number of fixed views in a window")
+    view_length: Seconds = Field(default=1.5, gt=0, description="length of a fixed view")
+    view_distance: Metres = Field(
+        default=1.5, gt=0, description="motion that renews the fixed views"
+    )
+    n_views: int = Field(default=5, ge=0, description="number of fixed views in a window")
     frozen: tuple[str, ...] = Field(
-        (),
+        default=(),
         description="slow states that are not estimated, such as `latency`, `extrinsic_rotation`",
     )
-    surfels: SurfelSettings = Field(SurfelSettings(), description="what makes a surfel")
+    surfels: SurfelSettings = Field(default=SurfelSettings(), description="what makes a surfel")
     registration: RegistrationSettings = Field(
-        RegistrationSettings(), description="how a window is registered"
+        default=RegistrationSettings(), description="how a window is registered"
     )
 
     @field_validator("frozen")

@@ -16,23 +16,25 @@ class NdtSettings(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     scan: Seconds = Field(
-        0.1, ge=0.02, le=1.0, description="length of a scan: one revolution of the lidar"
+        default=0.1, ge=0.02, le=1.0, description="length of a scan: one revolution of the lidar"
     )
     voxel_size: Metres = Field(
-        1.0,
+        default=1.0,
         gt=0.05,
         le=10.0,
         description="edge of the finest voxels; each further level doubles it",
     )
-    n_levels: int = Field(3, ge=1, le=6, description="number of voxel levels")
-    max_points: int = Field(4000, ge=100, description="most points of a scan that are registered")
+    n_levels: int = Field(default=3, ge=1, le=6, description="number of voxel levels")
+    max_points: int = Field(
+        default=4000, ge=100, description="most points of a scan that are registered"
+    )
     keyframe_distance: Metres = Field(
-        0.5, ge=0, description="motion of the lidar that makes a scan a keyframe"
+        default=0.5, ge=0, description="motion of the lidar that makes a scan a keyframe"
     )
     keyframe_angle: Radians = Field(
-        0.1, ge=0, description="turn of the lidar that makes a scan a keyframe"
+        default=0.1, ge=0, description="turn of the lidar that makes a scan a keyframe"
     )
     reference: Literal["keyframes", "last"] = Field(
-        "keyframes",
+        default="keyframes",
         description="what scans are registered to: all keyframes in reach of the lidar, or the last one",
     )

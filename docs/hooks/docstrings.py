@@ -52,12 +52,7 @@ def reworded(text: str) -> str:
 
 def _arguments(call: ExprCall) -> dict[str, str]:
     """Return the arguments of `Field(…)` by name, as they are written."""
-    return {
-        one.name if isinstance(one, ExprKeyword) else "default": str(
-            one.value if isinstance(one, ExprKeyword) else one
-        )
-        for one in call.arguments
-    }
+    return {one.name: str(one.value) for one in call.arguments if isinstance(one, ExprKeyword)}
 
 
 def _default(written: str) -> str:

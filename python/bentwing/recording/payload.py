@@ -58,7 +58,13 @@ def require_lever(value: Vector) -> Vector:
 
 
 class Transform(_Section):
-    """Rigid transform, `translation` in m and `quaternion` x y z w (normalized on entry)."""
+    """Rigid transform.
+
+    Attributes
+    ----------
+    translation : m
+    quaternion : x y z w, normalized on entry
+    """
 
     translation: Vector = (0.0, 0.0, 0.0)
     quaternion: Quaternion = (0.0, 0.0, 0.0, 1.0)
@@ -89,13 +95,17 @@ class Transform(_Section):
 
 
 class Lidar(_Section):
-    """The lidar; `topic` None means the only topic of a lidar type in the recording.
+    """The lidar.
 
-    latency : s, its stamps minus the IMU's clock, where that is known: where estimators begin
-
-    Ranges and `range_sigma` (one standard deviation) are in m and default by `kind`. For raw
-    packets: `model` of a Velodyne whose packets do not tell, and the file with the `metadata` of an
-    Ouster (JSON; relative to the payload file) where the recording has none.
+    Attributes
+    ----------
+    topic : None for the only topic of a lidar type in the recording
+    kind : decides the defaults of ranges and noise
+    model : of a Velodyne, where its raw packets do not identify it
+    metadata : JSON file of an Ouster, relative to the payload file, where the recording has none
+    min_range, max_range : m, closest and farthest return that is kept; default: by `kind`
+    range_sigma : m, one standard deviation of a range; default: by `kind`
+    latency : s, its stamps minus the IMU's clock; estimators start from it
     """
 
     topic: Topic | None = None
@@ -133,10 +143,15 @@ class Lidar(_Section):
 
 
 class Imu(_Section):
-    """The IMU; `topic` None means the only Imu topic in the recording.
+    """The IMU.
 
-    gyro_noise : rad/s/√Hz; accel_noise : m/s²/√Hz (densities that include the vibration)
-    gyro_bias_walk : rad/s²/√Hz; accel_bias_walk : m/s³/√Hz
+    Attributes
+    ----------
+    topic : None for the only Imu topic in the recording
+    gyro_noise : rad/s/√Hz, density that includes the vibration
+    accel_noise : m/s²/√Hz, density that includes the vibration
+    gyro_bias_walk : rad/s²/√Hz
+    accel_bias_walk : m/s³/√Hz
     """
 
     topic: Topic | None = None
@@ -147,7 +162,12 @@ class Imu(_Section):
 
 
 class Box(_Section):
-    """Axis-aligned box in the lidar frame, corners in m."""
+    """Axis-aligned box in the lidar frame.
+
+    Attributes
+    ----------
+    min, max : m, lowest and highest corner x y z
+    """
 
     min: Vector
     max: Vector
@@ -161,7 +181,12 @@ class Box(_Section):
 
 
 class SelfHit(_Section):
-    """A region in the lidar frame where returns are from the carrier itself."""
+    """A region in the lidar frame where returns are from the carrier itself.
+
+    Attributes
+    ----------
+    box : the region
+    """
 
     box: Box
 
@@ -171,8 +196,14 @@ class Encoder(_Section):
 
     `T_imu_lidar(θ) = T_imu_motor · Rot(axis, θ + zero) · T_motor_lidar`
 
-    axis : unit vector in the motor frame (normalized on entry); zero : rad
-    delay : s, at a stamp of the lidar the encoder's angle is that of this much earlier
+    Attributes
+    ----------
+    topic : None for the only JointState topic in the recording
+    axis : unit vector in the motor frame, normalized on entry
+    zero : rad, added to the encoder's angle
+    T_imu_motor : pose of the motor in the IMU frame
+    T_motor_lidar : pose of the lidar in the frame that the motor turns
+    delay : s, at a stamp of the lidar the angle is the encoder's of this much earlier
     """
 
     topic: Topic | None = None
@@ -198,7 +229,10 @@ class Encoder(_Section):
 class Gnss(_Section):
     """GNSS fixes (NavSatFix), used only when named.
 
-    `lever_arm` is the antenna's phase centre in the IMU frame, m.
+    Attributes
+    ----------
+    topic : of the fixes
+    lever_arm : m, phase centre of the antenna in the IMU frame
     """
 
     topic: Topic
@@ -227,7 +261,15 @@ class CalibrationRecord(_Section):
 class Payload(_Section):
     """The sensor head.
 
-    `imu: null` in the file says that the recording's IMU is not to be used.
+    Attributes
+    ----------
+    name : of the head
+    lidar, imu : the sensors; `imu: null` in the file says that the recording's IMU is not to be used
+    T_imu_lidar : pose of the lidar in the IMU frame, of a head without encoder
+    self_hits : regions where returns are from the carrier
+    encoder : the motor that turns the lidar, if there is one
+    gnss : the receiver, if its fixes are to be used
+    calibration : what `bentwing calibrate` has found out about the values above
     """
 
     name: str = "payload"

@@ -47,7 +47,7 @@ def consistency_table(walls: Thickness | None, revisits: Revisits | None) -> str
 def closing_table(record: Mapping[str, Any] | None, *, asked: bool) -> str:
     """Make the table of the global registration: what was matched, and what it moved."""
     if not record:
-        why = "Not recorded." if asked else "Loops were not to be closed: the map is open-loop."
+        why = "Not recorded." if asked else "Loop closure was off: the map is open-loop."
         return f'<p class="none">{why}</p>'
     verdict = "accepted" if record.get("applied") else f"rejected: {record.get('reason')}"
     rows: list[Row] = [("correction of the whole trajectory", verdict)]

@@ -9,6 +9,7 @@ import pytest
 import yaml
 from rosbags.rosbag1 import Reader, Writer
 
+import bentwing.run.flights
 from bentwing.cli.main import run_command
 
 

@@ -16,7 +16,7 @@ from bentwing.base.validation import describe
 from bentwing.closing.georeference.settings import GeoreferenceSettings
 from bentwing.closing.global_registration.settings import GlobalSettings
 from bentwing.map.clean import CleanSettings
-from bentwing.map.writer import MapFormat, require_format
+from bentwing.map.formats import MapFormat, require_format
 from bentwing.odometry import (
     ESTIMATORS,
     ContinuousSettings,
@@ -46,8 +46,7 @@ class MapSettings(BaseModel):
     @field_validator("map_format", mode="before")
     @classmethod
     def _can_be_written(cls, name: str) -> str:
-        require_format(name)
-        return name
+        return require_format(name)
 
     def to_json(self) -> dict[str, Any]:
         """Return the settings in plain JSON types, as run.json has them."""

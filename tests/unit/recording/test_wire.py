@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bentwing.recording.messages import wire, wire_clouds, wire_scans
+from bentwing.recording.messages import livox, wire, wire_clouds, wire_scans
 
 STAMP_NS = 1_700_000_000_250_000_000
 FRAMES = ["", "a", "ab", "abc", "laser", "base_link/front"]
@@ -69,7 +69,7 @@ def test_multi_echo_keeps_the_first_echo_within_range(ros):
 def test_livox_points_are_read_with_their_offsets(ros):
     points = [[1, 2, 3], [4, 5, 6], [7, 8, 9]]
     raw = ros.serialize(ros.livox(0.25, [0, 1000, 2000], points))
-    message = wire_clouds.livox_custom(raw, cdr=not ros.ros1)
+    message = livox.livox_custom(raw, cdr=not ros.ros1)
     assert message.stamp_ns == STAMP_NS
     np.testing.assert_array_equal(message.points["offset_time"], [0, 1000, 2000])
     np.testing.assert_array_equal(message.points["y"], [2, 5, 8])

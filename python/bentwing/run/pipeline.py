@@ -60,7 +60,7 @@ def map_recording(
     paths : one recording, or its consecutive parts
     payload : the sensor head, or the payload.yaml that describes it
     out : the run folder; see `RunFolder` for what may be there already
-    estimator : `continuous`, `kalman` or `ndt`; default: `continuous`
+    estimator : one of `ESTIMATORS`; default: `continuous`
     map_format : one of `MAP_FORMATS`; default: `laz`
     map_spacing : m, edge of the voxels that keep one point each; default: 0, which keeps all points
     cleaning : what the map leaves out; default: mixed pixels and what moved

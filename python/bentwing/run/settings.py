@@ -70,7 +70,7 @@ class MergeSettings(MapSettings):
 class RunSettings(MapSettings):
     """What decides a run.
 
-    `continuous`, `kalman` and `ndt` are the settings of the estimators; those of `estimator` count.
+    The field named as an estimator has its settings; those of `estimator` count.
     """
 
     estimator: EstimatorName = Field("continuous", description="name of the estimator")

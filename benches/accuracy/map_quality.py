@@ -25,7 +25,7 @@ from bentwing.base.geodesy import LevelFrame, ProjectedSystem
 from bentwing.base.progress import Progress
 from bentwing.base.run_record import read_record
 from bentwing.base.trajectory import read_tum
-from bentwing.closing.georeference import GeoreferenceSettings
+from bentwing.closing.georeference.settings import GeoreferenceSettings
 from bentwing.evaluate import simulated
 from bentwing.evaluate.alignment import align
 from bentwing.map.gps_time import adjusted_gps_origin

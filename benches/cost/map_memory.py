@@ -22,9 +22,10 @@ from bentwing.base.calibration import Calibration
 from bentwing.base.mount import FixedMount, Pose
 from bentwing.base.trajectory import Trajectory
 from bentwing.map.clean import clean
+from bentwing.map.formats import MAP_FORMATS
 from bentwing.map.project import project
 from bentwing.map.thin import thin
-from bentwing.map.writer import MAP_FORMATS, open_map
+from bentwing.map.writer import open_map
 from bentwing.recording.batches import LidarBatch
 
 if TYPE_CHECKING:

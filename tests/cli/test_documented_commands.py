@@ -14,6 +14,7 @@ import typer
 
 from bentwing.cli.commands import COMMANDS
 from bentwing.cli.main import app
+from bentwing.map import MAP_FORMATS
 from bentwing.odometry import ESTIMATORS
 
 ROOT = Path(__file__).parents[2]
@@ -110,3 +111,9 @@ def test_every_command_has_a_page_that_lists_its_options_and_names_no_others(nam
 def test_every_estimator_has_a_page_that_lists_its_settings(name: str) -> None:
     page = ROOT / "docs" / "estimators" / f"{name}.md"
     assert f"<!-- settings: {name} -->" in page.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("name", MAP_FORMATS)
+def test_the_page_of_the_map_says_how_exact_every_format_is(name: str) -> None:
+    rows = [line for line in (ROOT / "docs" / "map.md").read_text().splitlines() if "|" in line]
+    assert any(f"`{name}`" in row.split("|")[1] for row in rows)

@@ -10,7 +10,7 @@ import yaml
 
 from bentwing.base.errors import BentwingError, EstimationError, RecordingError, UsageError
 from bentwing.cli.main import run_command
-from bentwing.closing.georeference import GeoreferenceSettings
+from bentwing.closing import GeoreferenceSettings
 from bentwing.map.clean import CleanSettings
 from bentwing.recording import Payload
 from bentwing.run import pipeline

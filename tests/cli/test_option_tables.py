@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from bentwing.cli.commands import COMMANDS, load
+from bentwing.map import MAP_FORMATS
 from bentwing.odometry import ESTIMATORS
 
 ROOT = Path(__file__).parents[2]
@@ -48,10 +49,8 @@ def test_a_table_has_every_option_of_a_command_with_its_meaning(hook, name):
 
 def test_a_table_has_defaults_and_choices(hook):
     rows = {row[0]: row[1:] for row in rows_of(hook.table("options", "map"))}
-    assert rows["`--map-format NAME`"] == [
-        "`laz`",
-        "Format of the map. One of `laz`, `las`, `ply`, `pcd`, `e57`.",
-    ]
+    formats = ", ".join(f"`{name}`" for name in MAP_FORMATS)
+    assert rows["`--map-format NAME`"] == ["`laz`", f"Format of the map. One of {formats}."]
     assert rows["`-j`, `--threads N`"][0] == "all cores"
     assert rows["`--keep-moving`"][0] == ""
 

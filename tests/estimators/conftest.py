@@ -10,6 +10,7 @@ from __future__ import annotations
 import functools
 from collections import Counter
 from types import SimpleNamespace
+from typing import TYPE_CHECKING, NamedTuple
 
 import pytest
 
@@ -20,22 +21,45 @@ from bentwing.odometry.ndt import NdtSettings
 from bentwing.recording import LidarBatch, Payload, Recording
 from bentwing.recording.preprocess import preprocess
 
+if TYPE_CHECKING:
+    from pydantic import BaseModel
+
 LENGTH = 11.0  # s; the rest at the start is over after four
 THINNING = 3  # every third point, for speed
 
-# Settings that make each estimator quick and still go through all of its parts.
-QUICK = {
-    "continuous": ContinuousSettings(window=3.0, registration={"max_outer": 2}),
-    "kalman": KalmanSettings(rehearsal=6.0),
-    "ndt": NdtSettings(max_points=1000),
+SLOW_STATES = frozenset({"latency", "extrinsic_rotation", "gyro_bias", "accel_bias"})
+
+
+class Case(NamedTuple):
+    """An estimator in its contract.
+
+    Attributes
+    ----------
+    settings : quick ones that still go through all of its parts
+    head : of the simulation
+    estimated : slow states that it estimates, at least
+    needs_imu : whether it refuses a payload without an IMU
+    """
+
+    settings: BaseModel
+    head: str
+    estimated: frozenset[str] = frozenset()
+    needs_imu: bool = False
+
+
+CASES = {
+    "continuous": Case(
+        ContinuousSettings(window=3.0, registration={"max_outer": 2}), "hokuyo-spin", SLOW_STATES
+    ),
+    "kalman": Case(KalmanSettings(rehearsal=6.0), "vlp16-fixed", SLOW_STATES, needs_imu=True),
+    "ndt": Case(NdtSettings(max_points=1000), "vlp16-fixed"),
 }
-HEADS = {"continuous": "hokuyo-spin", "kalman": "vlp16-fixed", "ndt": "vlp16-fixed"}
 
 
 @pytest.fixture(scope="session")
 def heads(simulated):
     """Return the payload and the batches of the flight by the name of the estimator."""
-    return functools.cache(lambda name: _flown(simulated("office", 22.0, head=HEADS[name])))
+    return functools.cache(lambda name: _flown(simulated("office", 22.0, head=CASES[name].head)))
 
 
 @pytest.fixture
@@ -57,10 +81,16 @@ def _flown(folder):
 @pytest.fixture(scope="session")
 def quick():
     """Settings by the name of the estimator."""
-    return QUICK
+    return {name: case.settings for name, case in CASES.items()}
 
 
-@pytest.fixture(params=sorted(QUICK))
+@pytest.fixture
+def case(name):
+    """What the contract has to know of the estimator."""
+    return CASES[name]
+
+
+@pytest.fixture(params=sorted(odometry.ESTIMATORS))
 def name(request):
     """Of the estimator."""
     return request.param
@@ -72,7 +102,7 @@ def run(heads):
 
     def feed(name, *, batches=None, threads=1, settings=None):
         head = heads(name)
-        engine = odometry.create(name, head.payload, settings or QUICK[name], threads)
+        engine = odometry.create(name, head.payload, settings or CASES[name].settings, threads)
         for batch in head.batches if batches is None else batches:
             engine.feed(batch)
         return engine.result()

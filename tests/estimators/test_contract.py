@@ -99,10 +99,9 @@ def test_the_record_of_an_estimate_is_json_and_tells_every_window(plain_run, nam
     assert all(isinstance(n, int) for n in estimate.counts.values())
 
 
-def test_standard_deviations_are_positive_and_smaller_than_before(plain_run, name):
+def test_standard_deviations_are_positive_and_smaller_than_before(plain_run, case, name):
     std = plain_run(name).calibration.std
-    estimated = {"latency", "extrinsic_rotation", "gyro_bias", "accel_bias"}
-    assert estimated <= set(std) if name != "ndt" else not std
+    assert case.estimated <= set(std) if case.estimated else not std
     assert all(0 < value < 1 for values in std.values() for value in values)
 
 
@@ -235,10 +234,10 @@ def test_times_that_go_back_are_refused_by_name(run, head, name, kind):
         run(name, batches=batches)
 
 
-def test_without_an_imu_in_the_payload_the_lidar_stands_for_it(head, name):
+def test_without_an_imu_in_the_payload_the_lidar_stands_for_it(head, case, name):
     payload = head.payload.model_copy(update={"imu": None, "T_imu_lidar": None})
-    if name == "kalman":
-        with pytest.raises(PayloadError, match="predicts by an IMU and there is none"):
+    if case.needs_imu:
+        with pytest.raises(PayloadError, match="an IMU and there is none"):
             odometry.create(name, payload, None, 1)
         return
     engine = odometry.create(name, payload, None, 1)

@@ -15,10 +15,10 @@ from bentwing.base.errors import BentwingError
 from bentwing.recording import LidarBatch, Payload, Recording
 from bentwing.recording.lidar_stream import LidarStream
 from bentwing.recording.messages import wire_clouds
+from bentwing.recording.messages.lidar_messages import LIDAR_MESSAGES
 from bentwing.recording.messages.point_cloud2 import columns
 from bentwing.recording.point_times import TimeReading
 from bentwing.recording.streams import EncoderStream, ImuStream
-from bentwing.recording.topics import LASER_SCAN, LIVOX, MULTI_ECHO, POINT_CLOUD
 
 CLOCK = Clock(1_700_000_000 * 10**9)
 NOW_NS = CLOCK.start_ns + 250_000_000
@@ -73,11 +73,18 @@ def streams_and_messages(ros):
     table["x"], table["time"] = np.arange(1, 6), np.linspace(0, 0.1, 5)
     imu = ImuStream("/imu", CLOCK, cdr=cdr, use_recorder_time=False)
     encoder = EncoderStream("/encoder", CLOCK, cdr=cdr, use_recorder_time=False)
+    lidars = [
+        ros.cloud(0.25, table),
+        ros.scan(0.25, [1, 2, 3]),
+        ros.multi_echo(0.25, [[1], [2, 3]], []),
+        ros.livox(0.25, [0, 9], np.ones((2, 3))),
+    ]
+    # The two drivers of Livox share one layout.
+    assert {one.__msgtype__ for one in lidars} == {*LIDAR_MESSAGES} - {
+        "livox_ros_driver/msg/CustomMsg"
+    }
     return [
-        (lidar_stream(POINT_CLOUD, cdr=cdr), ros.serialize(ros.cloud(0.25, table))),
-        (lidar_stream(LASER_SCAN, cdr=cdr), ros.serialize(ros.scan(0.25, [1, 2, 3]))),
-        (lidar_stream(MULTI_ECHO, cdr=cdr), ros.serialize(ros.multi_echo(0.25, [[1], [2, 3]], []))),
-        (lidar_stream(LIVOX[1], cdr=cdr), ros.serialize(ros.livox(0.25, [0, 9], np.ones((2, 3))))),
+        *((lidar_stream(one.__msgtype__, cdr=cdr), ros.serialize(one)) for one in lidars),
         (imu, ros.serialize(ros.imu(0.25))),
         (encoder, ros.serialize(ros.joint(0.25, 1.0))),
     ]

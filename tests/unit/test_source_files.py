@@ -81,6 +81,16 @@ def test_tests_and_benches_do_not_import_each_other(folder, others) -> None:
     assert not across, "what both need belongs to bentwing.evaluate"
 
 
+def test_every_file_that_the_recipes_name_exists() -> None:
+    text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    recipes = re.search(r"^## Recipes$(.*?)^## ", text, re.MULTILINE | re.DOTALL)
+    assert recipes
+    # Names in angle brackets are those of files to be added.
+    named = set(re.findall(r"(?<![\w/>])(?:[\w.]+/)+[\w.]*(?![\w<])", recipes[1]))
+    assert len(named) > 30
+    assert sorted(name for name in named if not (ROOT / name).exists()) == []
+
+
 def checks(function: ast.FunctionDef, others: dict[str, ast.FunctionDef]) -> bool:
     """Whether a function, or one of its file that it calls, can fail a test."""
     others = {name: other for name, other in others.items() if other is not function}

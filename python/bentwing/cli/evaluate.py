@@ -9,6 +9,7 @@ import typer
 
 from bentwing.cli import options
 from bentwing.cli.options import INPUT, option
+from bentwing.map.formats import MAP_FORMATS
 
 EXAMPLES = (
     "bentwing evaluate run",
@@ -33,7 +34,7 @@ def command(
     ] = None,
     reference_map: Annotated[
         Path | None,
-        option(INPUT, metavar="FILE", help="Cloud (laz, las, ply, pcd, e57) or PLY mesh."),
+        option(INPUT, metavar="FILE", help=f"Cloud ({', '.join(MAP_FORMATS)}) or PLY mesh."),
     ] = None,
     clock_offset: Annotated[
         float | None,

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Annotated
 
 from bentwing.cli import options
+from bentwing.map.formats import MAP_FORMATS
 
 EXAMPLES = (
     "bentwing localize recording.bag --map site -p payload.yaml -o today",
@@ -21,7 +22,7 @@ def command(
             options.INPUT,
             "--map",
             metavar="MAP",
-            help="Find the recording in this: a run folder, or a .laz, .las, .ply, .pcd or .e57 file.",
+            help=f"Find the recording in this: a run folder, or a map ({', '.join(MAP_FORMATS)}).",
         ),
     ],
     out: options.Out,

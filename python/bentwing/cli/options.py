@@ -1,12 +1,16 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
 """The options that several commands have: each with one name, one short form and one sentence."""
 
+from collections.abc import Iterable
+from enum import Enum
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from bentwing.cli.choices import EstimatorName, GeoreferenceMode, MapFormat
+from bentwing.closing.georeference.names import GeoreferenceMode
+from bentwing.map.formats import MapFormat
+from bentwing.odometry.names import EstimatorName
 
 # The groups of a help page, in its order.
 INPUT = "Input"
@@ -21,6 +25,11 @@ GROUPS = (INPUT, RESULT, ESTIMATION, MAP, EARTH, RUNNING)
 def option(group: str, *names: str, **details: Any) -> Any:  # noqa: ANN401 - typer's own
     """Return an option in a group of the help page."""
     return typer.Option(*names, rich_help_panel=group, **details)
+
+
+def enumeration(title: str, names: Iterable[str]) -> Any:  # noqa: ANN401 - a type
+    """Return the type of a repeatable choice: typer takes lists of enumerations, but not of literals."""
+    return Enum(title, {name: name for name in names}, type=str)
 
 
 def out(*aliases: str, **details: Any) -> Any:  # noqa: ANN401 - typer's own

@@ -2,13 +2,18 @@
 """`bentwing reproduce`: a paper's figures and tables, made again."""
 
 from pathlib import Path
-from typing import Annotated, get_args
+from typing import TYPE_CHECKING, Annotated, get_args
 
 import typer
 
 from bentwing.cli import options
-from bentwing.cli.choices import PaperName, PartName
-from bentwing.cli.options import ESTIMATION, INPUT, option
+from bentwing.cli.options import ESTIMATION, INPUT, enumeration, option
+from bentwing.reproduce.names import PaperName, PartName
+
+if TYPE_CHECKING:
+    from enum import Enum as Part
+else:
+    Part = enumeration("Part", get_args(PartName))
 
 EXAMPLES = (
     "bentwing reproduce kaul2015 -o kaul2015",
@@ -28,12 +33,12 @@ def command(
     ],
     *,
     part: Annotated[
-        list[PartName],
+        list[Part],
         option(
             INPUT,
             "--part",
             metavar="NAME",
-            help="Make one part only, repeatable: mapping, flight.",
+            help=f"Make one part only, repeatable: {', '.join(get_args(PartName))}.",
             show_default="all of the paper's",
         ),
     ] = [],  # noqa: B006 - typer reads it and hands out a copy

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated, get_args
 import typer
 
 from bentwing.cli import options
-from bentwing.cli.choices import (
+from bentwing.cli.options import RESULT, enumeration, option
+from bentwing.simulate.names import (
     EventName,
     FlightName,
     HeadName,
@@ -16,10 +17,14 @@ from bentwing.cli.choices import (
     SceneName,
     SpinName,
 )
-from bentwing.cli.options import RESULT, option
 
 if TYPE_CHECKING:
+    from enum import Enum as Event
+
     from bentwing.simulate import Scenario
+else:
+    Event = enumeration("Event", get_args(EventName))
+
 
 EXAMPLES = (
     "bentwing simulate courtyard -o recording --duration 30",
@@ -90,12 +95,12 @@ def command(
         ReceiverName | None, option(HEAD, help="Add a GNSS receiver.", show_default="none")
     ] = None,
     event: Annotated[
-        list[EventName],
+        list[Event],
         option(
             TROUBLE,
             "--event",
             metavar="NAME",
-            help=f"What goes wrong, repeatable: {', '.join(one.value for one in EventName)}.",
+            help=f"What goes wrong, repeatable: {', '.join(get_args(EventName))}.",
             show_default=False,
         ),
     ] = [],  # noqa: B006 - typer reads it and hands out a copy

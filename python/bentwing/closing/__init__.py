@@ -6,7 +6,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from bentwing.closing.georeference.settings import GeoreferenceMode, GeoreferenceSettings
+    from bentwing.closing.georeference.names import GeoreferenceMode
+    from bentwing.closing.georeference.settings import GeoreferenceSettings
     from bentwing.closing.places.cut import describe_run
     from bentwing.closing.places.from_run import places_of_cloud, places_of_run
     from bentwing.closing.places.match import Candidate, match_places
@@ -27,7 +28,8 @@ else:
     __getattr__, __dir__ = lazy(
         __name__,
         {
-            "closing.georeference.settings": ["GeoreferenceMode", "GeoreferenceSettings"],
+            "closing.georeference.names": ["GeoreferenceMode"],
+            "closing.georeference.settings": ["GeoreferenceSettings"],
             "closing.places.cut": ["describe_run"],
             "closing.places.from_run": ["places_of_cloud", "places_of_run"],
             "closing.places.match": ["Candidate", "match_places"],

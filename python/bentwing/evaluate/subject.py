@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from bentwing.base.errors import UsageError
-from bentwing.map.read import MAP_SUFFIXES
+from bentwing.map.formats import MAP_SUFFIXES
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from bentwing.map.clean import CleanSettings
+    from bentwing.map.formats import MAP_FORMATS, MapFormat
     from bentwing.map.read import MapPart, read_parts, read_points
-    from bentwing.map.writer import MAP_FORMATS, MapFormat
 else:
     from bentwing.base.lazy import lazy
 
@@ -16,8 +16,8 @@ else:
         __name__,
         {
             "map.clean": ["CleanSettings"],
+            "map.formats": ["MAP_FORMATS", "MapFormat"],
             "map.read": ["MapPart", "read_parts", "read_points"],
-            "map.writer": ["MAP_FORMATS", "MapFormat"],
         },
     )
 

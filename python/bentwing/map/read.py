@@ -11,15 +11,12 @@ import numpy as np
 
 from bentwing.base.errors import BentwingError, InputError
 from bentwing.base.value import Value
-from bentwing.map.read_e57 import e57_scans
-from bentwing.map.read_rows import PART, pcd_rows, ply_rows
+from bentwing.map.formats import FORMATS, MAP_SUFFIXES, load
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Iterator, Mapping
 
     from numpy.typing import NDArray
-
-    Table = tuple[NDArray[np.float64], NDArray[np.float64] | None]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,7 +47,7 @@ def read_points(path: Path | str) -> NDArray[np.float64]:
 def read_parts(
     path: Path | str, georeference: Mapping[str, Any] | None = None
 ) -> Iterator[MapPart]:
-    """Read a .laz, .las, .ply, .pcd or .e57 file in parts that fit into memory.
+    """Read a file of one of `MAP_FORMATS` in parts that fit into memory.
 
     Parameters
     ----------
@@ -67,18 +64,19 @@ def read_parts(
     if not path.exists():
         msg = f"{path}: no such file or folder"
         raise InputError(msg)
-    reader = _READERS.get(path.suffix.lower())
+    suffix = path.suffix.lower()
+    reader = next((f.reader for name, f in FORMATS.items() if suffix == f".{name}"), None)
     if reader is None:
-        msg = f"{path}: maps are read from {', '.join(_READERS)} files; convert it first"
+        msg = f"{path}: maps are read from {', '.join(MAP_SUFFIXES)} files; convert it first"
         raise InputError(msg)
     try:
-        for points, times in reader(path):
+        for points, times in load(reader)(path):
             yield MapPart(_in_map_frame(points, georeference), times)
     except BentwingError:
         raise
     except Exception as error:
         # Parsers of foreign files fail in every way there is; the file is what the user can change.
-        msg = f"{path}: not readable as {path.suffix.lower()[1:].upper()} ({error})"
+        msg = f"{path}: not readable as {suffix[1:].upper()} ({error})"
         raise InputError(msg) from error
 
 
@@ -91,29 +89,3 @@ def _in_map_frame(
     inverse = np.linalg.inv(linear["matrix"])
     local: NDArray[np.float64] = (points - linear["projected"]) @ inverse.T + linear["map"]
     return local
-
-
-def _las_parts(path: Path) -> Iterator[Table]:
-    import laspy  # PLY and PCD are read without it
-
-    with laspy.open(path) as file:
-        has_times = "gps_time" in file.header.point_format.dimension_names
-        n = 0
-        for part in file.chunk_iterator(PART):
-            n += len(part)
-            points = np.stack([part.x, part.y, part.z], axis=1).astype(np.float64)
-            yield points, np.array(part.gps_time, np.float64) if has_times else None
-        if n != file.header.point_count:
-            msg = f"{path}: announces {file.header.point_count} points, holds {n}; it is truncated"
-            raise InputError(msg)
-
-
-_READERS: dict[str, Callable[[Path], Iterator[Table]]] = {
-    ".laz": _las_parts,
-    ".las": _las_parts,
-    ".ply": ply_rows,
-    ".pcd": pcd_rows,
-    ".e57": e57_scans,
-}
-
-MAP_SUFFIXES = tuple(_READERS)

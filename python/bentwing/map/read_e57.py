@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing.map.write_e57 import require_pye57
+from bentwing.map.formats import require_package
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -20,8 +20,7 @@ _AXES = ("cartesianX", "cartesianY", "cartesianZ")
 
 def e57_scans(path: Path) -> Iterator[tuple[NDArray[np.float64], None]]:
     """Read the points of one station after the other; times are not read."""
-    pye57 = require_pye57()
-    file = pye57.E57(str(path))
+    file = require_package("e57").E57(str(path))
     try:
         for scan in range(file.scan_count):
             # with its pose applied, and without the returns that the scanner calls invalid

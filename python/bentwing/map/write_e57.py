@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bentwing.base.errors import UsageError
+from bentwing.map.formats import require_package
 from bentwing.map.writer import MapWriter, round_offset
 
 if TYPE_CHECKING:
@@ -18,23 +18,7 @@ if TYPE_CHECKING:
 POINTS_PER_SCAN = 5_000_000
 
 
-def require_pye57() -> Any:  # noqa: ANN401 - the package has no types
-    """Import pye57.
-
-    Raises
-    ------
-    UsageError
-        If it is not installed.
-    """
-    try:
-        import pye57
-    except ImportError:
-        msg = "E57 maps need the package pye57, which is not installed; run `pip install bentwing[e57]`"
-        raise UsageError(msg) from None
-    return pye57
-
-
-def _file_in(pye57: Any, crs_wkt: str) -> Any:  # noqa: ANN401 - as above
+def _file_in(pye57: Any, crs_wkt: str) -> Any:  # noqa: ANN401 - the package has no types
     """Return pye57's file for a coordinate system, which its own header leaves empty for good."""
     lib = pye57.libe57
 
@@ -66,7 +50,7 @@ class E57Writer(MapWriter):
     """Writer of E57, as scans of `POINTS_PER_SCAN` points in one frame."""
 
     def _begin(self, first: MapChunk) -> None:
-        pye57 = require_pye57()
+        pye57 = require_package("e57")
         self._has_intensity = first.intensity is not None
         self._file = _file_in(pye57, self.crs_wkt or "")(str(self._temporary), mode="w")
         self._waiting: list[MapChunk] = []

@@ -4,14 +4,13 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from importlib import import_module
-from typing import TYPE_CHECKING, Literal, TypeAlias, cast, get_args
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
 from bentwing.base.atomic import publish, temporary_name
-from bentwing.base.errors import UsageError
 from bentwing.map.chunk import MapChunk
+from bentwing.map.formats import FORMATS, load, require_format
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -20,16 +19,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from typing_extensions import Self
 
-MapFormat: TypeAlias = Literal["laz", "las", "ply", "pcd", "e57"]
-MAP_FORMATS: tuple[MapFormat, ...] = get_args(MapFormat)
-
-_WRITERS = {
-    "laz": "write_las.LazWriter",
-    "las": "write_las.LasWriter",
-    "ply": "write_ply.PlyWriter",
-    "pcd": "write_pcd.PcdWriter",
-    "e57": "write_e57.E57Writer",
-}
 _OFFSET_STEP = 1000.0  # m; a local map gets offset 0, a georeferenced one a round number
 
 
@@ -109,19 +98,8 @@ def open_map(
     UsageError
         If the format is unknown or needs a package that is not installed.
     """
-    require_format(map_format)
-    module, name = _WRITERS[map_format].split(".")
-    writer = getattr(import_module(f"bentwing.map.{module}"), name)
+    writer = load(FORMATS[require_format(map_format)].writer)
     return cast("MapWriter", writer(path, clock_origin_ns, crs_wkt))
-
-
-def require_format(map_format: str) -> None:
-    """Refuse a format that cannot be written, before the hours of work that come first."""
-    if map_format not in _WRITERS:
-        msg = f"map format {map_format!r} is not known; choose one of {', '.join(MAP_FORMATS)}"
-        raise UsageError(msg)
-    if map_format == "e57":
-        import_module("bentwing.map.write_e57").require_pye57()
 
 
 def round_offset(points: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -15,11 +15,11 @@ if TYPE_CHECKING:
     from bentwing.odometry.interface import Estimator
     from bentwing.odometry.kalman.estimator import Kalman
     from bentwing.odometry.kalman.settings import KalmanSettings
+    from bentwing.odometry.names import EstimatorName
     from bentwing.odometry.ndt.estimator import Ndt
     from bentwing.odometry.ndt.settings import NdtSettings
     from bentwing.odometry.registry import (
         ESTIMATORS,
-        EstimatorName,
         EstimatorSettings,
         create,
         require_estimator,
@@ -41,11 +41,11 @@ else:
             "odometry.interface": ["Estimator"],
             "odometry.kalman.estimator": ["Kalman"],
             "odometry.kalman.settings": ["KalmanSettings"],
+            "odometry.names": ["EstimatorName"],
             "odometry.ndt.estimator": ["Ndt"],
             "odometry.ndt.settings": ["NdtSettings"],
             "odometry.registry": [
                 "ESTIMATORS",
-                "EstimatorName",
                 "EstimatorSettings",
                 "create",
                 "require_estimator",

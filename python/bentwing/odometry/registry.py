@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 from bentwing.base.arguments import instance
 from bentwing.base.errors import UsageError
@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from pydantic import BaseModel
 
     from bentwing.odometry.interface import Estimator
+    from bentwing.odometry.names import EstimatorName
     from bentwing.recording.payload import PayloadLike
 
-EstimatorName: TypeAlias = Literal["continuous", "kalman", "ndt"]
 EstimatorSettings: TypeAlias = ContinuousSettings | KalmanSettings | NdtSettings
 ESTIMATORS: dict[EstimatorName, tuple[Callable[..., Estimator], type[BaseModel]]] = {
     "continuous": (Continuous, ContinuousSettings),

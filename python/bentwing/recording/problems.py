@@ -6,7 +6,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from bentwing.base.clock import NS_PER_S
-from bentwing.recording.topics import LASER_SCAN, MULTI_ECHO
+from bentwing.recording.messages.lidar_messages import is_planar
 
 if TYPE_CHECKING:
     from bentwing.recording.peek import Peek
@@ -25,7 +25,7 @@ def mount(imu_topic: str) -> str:
 
 def point_times(lidar_topic: str, lidar_type: str) -> str:
     """Return the sentence on a lidar that does not tell when each point was measured."""
-    if lidar_type in (LASER_SCAN, MULTI_ECHO):
+    if is_planar(lidar_type):
         return (
             f"{lidar_topic}: no time per beam (time_increment is 0), so a moving scan cannot be "
             "undistorted; set time_increment (time per turn / beams per turn) in the lidar's "

@@ -6,6 +6,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from bentwing.base.errors import RecordingError
+from bentwing.recording.messages.lidar_messages import LIDAR_MESSAGES
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -13,10 +14,6 @@ if TYPE_CHECKING:
     from bentwing.recording.containers.scanned import TopicInfo
     from bentwing.recording.payload import Payload
 
-LASER_SCAN = "sensor_msgs/msg/LaserScan"
-MULTI_ECHO = "sensor_msgs/msg/MultiEchoLaserScan"
-POINT_CLOUD = "sensor_msgs/msg/PointCloud2"
-LIVOX = ("livox_ros_driver/msg/CustomMsg", "livox_ros_driver2/msg/CustomMsg")
 IMU = "sensor_msgs/msg/Imu"
 VELODYNE_SCAN = "velodyne_msgs/msg/VelodyneScan"
 # Both of the lidar's packets and of those of its IMU; the topic's name tells which.
@@ -34,7 +31,7 @@ OUSTER_TYPES = (*OUSTER_PACKETS, UDP_OUSTER_LIDAR, UDP_OUSTER_IMU)
 PACKET_TYPES = (*VELODYNE_TYPES, *OUSTER_TYPES)
 # By preference: where a driver recorded both, its decoded messages need nothing else.
 LIDAR_TYPES = (
-    (LASER_SCAN, MULTI_ECHO, POINT_CLOUD, *LIVOX),
+    tuple(LIDAR_MESSAGES),
     (*VELODYNE_TYPES, *OUSTER_PACKETS, UDP_OUSTER_LIDAR),
 )
 IMU_TYPES = ((IMU,), (*OUSTER_PACKETS, UDP_OUSTER_IMU))

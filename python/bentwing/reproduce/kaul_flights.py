@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
     from bentwing.reproduce.figure import Assignment
     from bentwing.run.found import Found
-    from bentwing.simulate.scenario import SceneName
+    from bentwing.simulate.names import SceneName
     from bentwing.simulate.setup import Setup
     from bentwing.simulate.write import SimulatedRecording
 

@@ -26,8 +26,9 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from bentwing.reproduce.figure import Part
+    from bentwing.reproduce.names import PaperName, PartName
 
-PARTS: dict[str, dict[str, Callable[[Assignment], Part]]] = {
+PARTS: dict[PaperName, dict[PartName, Callable[[Assignment], Part]]] = {
     "kaul2015": {"mapping": mapping_part, "flight": flight_part},
     "fu2023": {"mapping": fu_part},
     "tazir2020": {"mapping": tazir_part},
@@ -44,9 +45,9 @@ class Reproduced:
 
 
 def reproduce(
-    paper: str,
+    paper: PaperName,
     out: Path,
-    parts: Sequence[str] = (),
+    parts: Sequence[PartName] = (),
     *,
     quick: bool = False,
     seed: int = 1,

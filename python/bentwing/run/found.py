@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bentwing.base.estimate import Estimate
-    from bentwing.closing.georeference import Georeferenced
+    from bentwing.closing.georeference.georeference import Georeferenced
     from bentwing.closing.localize import GivenCoordinates
     from bentwing.recording import Batch
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from bentwing.base.progress import Progress
-    from bentwing.closing.georeference import GeoreferenceSettings
+    from bentwing.closing.georeference.settings import GeoreferenceSettings
     from bentwing.closing.localize import PriorMap
     from bentwing.map import MapFormat
     from bentwing.map.clean import CleanSettings
@@ -60,8 +60,8 @@ def map_recording(
     paths : one recording, or its consecutive parts
     payload : the sensor head, or the payload.yaml that describes it
     out : the run folder; see `RunFolder` for what may be there already
-    estimator : `continuous`, `kalman` or `ndt`; default: `continuous`
-    map_format : `laz`, `las`, `ply`, `pcd` or `e57`; default: `laz`
+    estimator : one of `ESTIMATORS`; default: `continuous`
+    map_format : one of `MAP_FORMATS`; default: `laz`
     map_spacing : m, edge of the voxels that keep one point each; default: 0, which keeps all points
     cleaning : what the map leaves out; default: mixed pixels and what moved
     georeferencing : how GNSS fixes and control points are used; default: fixes, where the payload

@@ -16,7 +16,7 @@ from bentwing.base.validation import describe
 from bentwing.closing.georeference.settings import GeoreferenceSettings
 from bentwing.closing.global_registration.settings import GlobalSettings
 from bentwing.map.clean import CleanSettings
-from bentwing.map.writer import MapFormat, require_format
+from bentwing.map.formats import MapFormat, require_format
 from bentwing.odometry import (
     ESTIMATORS,
     ContinuousSettings,
@@ -50,8 +50,7 @@ class MapSettings(BaseModel):
     @field_validator("map_format", mode="before")
     @classmethod
     def _can_be_written(cls, name: str) -> str:
-        require_format(name)
-        return name
+        return require_format(name)
 
     def to_json(self) -> dict[str, Any]:
         """Return the settings in plain JSON types, as run.json has them."""
@@ -75,7 +74,7 @@ class MergeSettings(MapSettings):
 class RunSettings(MapSettings):
     """What decides a run.
 
-    `continuous`, `kalman` and `ndt` are the settings of the estimators; those of `estimator` count.
+    The field named as an estimator has its settings; those of `estimator` count.
     """
 
     estimator: EstimatorName = Field(default="continuous", description="name of the estimator")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from bentwing.base.errors import EstimationError, NotEnoughDataError
 from bentwing.base.progress import Progress
-from bentwing.closing.georeference import georeference
+from bentwing.closing.georeference.georeference import georeference
 from bentwing.closing.global_registration import Budget, close_loops
 from bentwing.closing.joining.segments import close_segments
 from bentwing.closing.localize import Difference, NotInMapError, find_in_map

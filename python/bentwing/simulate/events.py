@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,17 +21,6 @@ if TYPE_CHECKING:
     from bentwing.simulate.imu import ImuErrors
 
     Array = NDArray[np.float64]
-
-EventName = Literal[
-    "spin-stall",
-    "gusts",
-    "person",
-    "dropped-packets",
-    "strong-bias",
-    "motion-start",
-    "gap",
-    "motor-reversal",
-]
 
 STALL = 4.0
 """s, how long the head does not turn where nothing else is asked for."""

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,10 +18,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bentwing.simulate.kinematics import Motion
+    from bentwing.simulate.names import ReceiverName
 
     Array = NDArray[np.float64]
-
-ReceiverName = Literal["rtk", "single"]
 
 RATE_HZ = 5.0
 OUTLIERS = 0.03

@@ -3,24 +3,24 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from bentwing.simulate.events import STALL, EventName, strong_bias
-from bentwing.simulate.gnss import ReceiverName  # noqa: TC001 - pydantic reads the annotations
+from bentwing.simulate.events import STALL, strong_bias
 from bentwing.simulate.imu import PERFECT, ImuErrors
+from bentwing.simulate.names import (  # noqa: TC001 - pydantic reads the annotations
+    EventName,
+    FlightName,
+    HeadName,
+    ReceiverName,
+    RecordingFormat,
+    SceneName,
+    SpinName,
+)
 from bentwing.simulate.ranging import RangeErrors
 
-SceneName = Literal[
-    "courtyard", "compound", "office", "forest", "cave", "mine", "town", "walls", "dam",
-    "mocap", "carpark", "campus",
-]  # fmt: skip
-HeadName = Literal["hokuyo-spin", "hokuyo-nod", "vlp16-fixed", "vlp16-side", "vlp16-motor"]
-SpinName = Literal["steady", "plant"]
-FlightName = Literal["tour", "survey", "stand"]
-Format = Literal["bag", "mcap", "db3"]
 _SURVEYED = ("walls", "dam")
 
 
@@ -57,7 +57,7 @@ class Scenario(BaseModel):
     duration: float = Field(default=60.0, gt=0.0, le=3600.0)
     seed: int = Field(default=0, ge=0)
     flight_seed: int | None = Field(default=None, ge=0)
-    format: Format = "bag"
+    format: RecordingFormat = "bag"
     motor_rate: float = Field(default=1.0, gt=0.0, le=10.0)
     spin: SpinName = "steady"
     max_range: float | None = Field(default=None, gt=1.0)

@@ -40,7 +40,7 @@ def written(path, n=2_500):
 @pytest.mark.parametrize("kind", ["laz", "las", "ply", "pcd"])
 def test_parts_hold_all_points_with_their_times(tmp_path, monkeypatch, kind):
     monkeypatch.setattr(read_rows, "PART", 1_000)
-    monkeypatch.setattr("bentwing.map.read.PART", 1_000)
+    monkeypatch.setattr("bentwing.map.read_las.PART", 1_000)
     path = tmp_path / f"map.{kind}"
     chunk = written(path)
     parts = list(read_parts(path))

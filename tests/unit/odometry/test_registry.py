@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
+from typing import get_args
+
 import pytest
 
 from bentwing import Odometry, odometry
@@ -38,8 +40,12 @@ def test_every_estimator_is_made_with_its_defaults_and_with_its_settings(name):
     assert not made.advance()
 
 
+def test_every_name_has_an_estimator():
+    assert tuple(odometry.ESTIMATORS) == get_args(odometry.EstimatorName)
+
+
 def test_live_odometry_takes_the_same_names_and_settings():
-    with pytest.raises(UsageError, match="'slam' is not known; choose continuous, kalman or ndt"):
+    with pytest.raises(UsageError, match="'slam' is not known; choose continuous, kalman"):
         Odometry(HEAD, estimator="slam")
     with pytest.raises(TypeError, match="settings: expected a ContinuousSettings"):
         Odometry(HEAD, settings=KalmanSettings())

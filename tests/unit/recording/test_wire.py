@@ -3,10 +3,14 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from bentwing.recording.messages import wire, wire_clouds, wire_scans
+from bentwing.recording.messages import livox, wire, wire_clouds, wire_scans
+from bentwing.recording.messages.lidar_messages import LIDAR_MESSAGES
 
 STAMP_NS = 1_700_000_000_250_000_000
 FRAMES = ["", "a", "ab", "abc", "laser", "base_link/front"]
@@ -69,7 +73,7 @@ def test_multi_echo_keeps_the_first_echo_within_range(ros):
 def test_livox_points_are_read_with_their_offsets(ros):
     points = [[1, 2, 3], [4, 5, 6], [7, 8, 9]]
     raw = ros.serialize(ros.livox(0.25, [0, 1000, 2000], points))
-    message = wire_clouds.livox_custom(raw, cdr=not ros.ros1)
+    message = livox.livox_custom(raw, cdr=not ros.ros1)
     assert message.stamp_ns == STAMP_NS
     np.testing.assert_array_equal(message.points["offset_time"], [0, 1000, 2000])
     np.testing.assert_array_equal(message.points["y"], [2, 5, 8])
@@ -98,3 +102,11 @@ def test_every_truncation_is_a_broken_message(ros):
         for n in range(len(raw) - 1):
             with pytest.raises(wire.BrokenMessageError):
                 parse(raw[:n], cdr=cdr)
+
+
+@pytest.mark.parametrize("kind", LIDAR_MESSAGES)
+def test_the_documentation_names_every_type_that_is_read(kind):
+    package, name = kind.split("/msg/")
+    text = (Path(__file__).parents[3] / "docs" / "sensors.md").read_text(encoding="utf-8")
+    row = rf"^\| `({package}/{name}`|{name}` of .*`{package}`)"
+    assert re.search(row, text, re.MULTILINE)

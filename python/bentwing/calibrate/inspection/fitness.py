@@ -10,8 +10,8 @@ import numpy as np
 
 from bentwing.calibrate.inspection.planar import MIN_CORRELATION, level_share
 from bentwing.recording import imu_units, problems
+from bentwing.recording.messages.lidar_messages import is_planar
 from bentwing.recording.preprocess import find_static_start
-from bentwing.recording.topics import LASER_SCAN, MULTI_ECHO
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -150,8 +150,7 @@ def _imu_rate(recording: Recording, samples: Samples) -> list[str]:
 
 def _planar_defects(recording: Recording, samples: Samples) -> list[str]:
     """Return why a 2D lidar cannot make a 3D map, if it cannot."""
-    is_planar = recording.lidar_type in (LASER_SCAN, MULTI_ECHO)
-    if not is_planar or recording.encoder_topic is not None:
+    if not is_planar(recording.lidar_type) or recording.encoder_topic is not None:
         return []
     if not len(samples.imu_times):
         return [

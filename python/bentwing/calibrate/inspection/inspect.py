@@ -17,8 +17,8 @@ from bentwing.calibrate.inspection.spin import Spin, spin_from_encoder, spin_fro
 from bentwing.calibrate.inspection.structure import Structure, StructureMeter
 from bentwing.recording.batches import EncoderBatch, ImuBatch
 from bentwing.recording.containers.source import open_source
+from bentwing.recording.messages.lidar_messages import LASER_SCAN
 from bentwing.recording.recording import Recording
-from bentwing.recording.topics import LASER_SCAN
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

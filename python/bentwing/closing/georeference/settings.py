@@ -4,11 +4,12 @@
 from __future__ import annotations
 
 from pathlib import Path  # noqa: TC003 - pydantic reads the annotations
-from typing import Literal, TypeAlias
 
 from pydantic import BaseModel, ConfigDict, Field
 
-GeoreferenceMode: TypeAlias = Literal["rigid", "constraints", "off"]
+from bentwing.closing.georeference.names import (
+    GeoreferenceMode,  # noqa: TC001 - pydantic reads the annotations
+)
 
 
 class GeoreferenceSettings(BaseModel):

@@ -65,7 +65,7 @@ class PriorMap:
 
 
 def read_prior_map(path: Path, settings: SurfelSettings) -> PriorMap:
-    """Read a run folder, or a gravity-aligned .laz, .las, .ply, .pcd or .e57 file.
+    """Read a run folder, or a gravity-aligned file of one of `MAP_FORMATS`.
 
     Of a run it is known from where every point was seen, so that the two sides of a wall are told
     apart; of a cloud it is not.

@@ -16,8 +16,9 @@ from bentwing.closing.places.cut import describe_parts
 from bentwing.closing.places.settings import PlaceSettings
 from bentwing.closing.places.stream import PartStream
 from bentwing.closing.places.tiles import tiled
+from bentwing.map.formats import MAP_SUFFIXES
 from bentwing.map.gps_time import adjusted_gps_origin
-from bentwing.map.read import MAP_SUFFIXES, read_parts
+from bentwing.map.read import read_parts
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping

@@ -3,35 +3,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from bentwing.odometry.continuous.settings import RegistrationSettings
+
 if TYPE_CHECKING:
-    from bentwing.odometry.continuous.settings import RegistrationSettings
     from bentwing.recording import Payload
 
 
-@dataclass(frozen=True, slots=True)
-class CoreSettings:
-    """Fields as in `RegistrationSettings`; sigmas in m, rad/s, m/s² per trajectory sample."""
+class CoreSettings(RegistrationSettings):
+    """Sigmas in m and, per trajectory sample, in rad/s and m/s²."""
 
-    knot_interval: float
     range_sigma: float
-    n_neighbors: int
-    max_match_distance: float
-    min_match_gap: float
-    first_cauchy_scale: float
-    cauchy_scale: float
-    max_outer: int
-    n_inner: int
-    min_translation: float
-    min_rotation: float
-    velocity_sigma: float
-    rate_sigma: float
     gyro_sigma: float
     accel_sigma: float
-    motion_accel_density: float
-    motion_angular_density: float
 
     @classmethod
     def of(cls, settings: RegistrationSettings, payload: Payload, dt: float) -> CoreSettings:

@@ -6,21 +6,69 @@ from __future__ import annotations
 import functools
 import itertools
 import math
-from typing import TYPE_CHECKING
+from collections import Counter
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from bentwing.recording.batches import LidarBatch
+from bentwing.recording.messages import wire, wire_scans
+from bentwing.recording.messages.decoder import LidarDecoder
+from bentwing.recording.messages.wire_scans import RawScan
 
 if TYPE_CHECKING:
-    from collections import Counter
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
-    from bentwing.recording.messages.wire_scans import RawScan
-
 MAX_SWEEP = 10.0  # s; a longer scan is a damaged time_increment
+
+
+class LaserScans(LidarDecoder[RawScan]):
+    """sensor_msgs/LaserScan."""
+
+    is_planar: ClassVar[bool] = True
+    _read: ClassVar[Callable[..., RawScan]] = staticmethod(wire_scans.laser_scan)
+
+    def point_times(
+        self,
+        messages: Sequence[bytes],
+        stamps_ns: Sequence[int],  # noqa: ARG002 - clouds need them
+    ) -> tuple[str | None, None]:
+        """Return the sentence on the first scan that can be read."""
+        for raw in messages:
+            try:
+                scan = self.parse(raw, Counter())
+            except wire.BrokenMessageError:
+                continue
+            if not has_beam_times(scan):
+                return None, None
+            return f"time per beam: stamp + i * {scan.time_increment * 1e6:.4g} us", None
+        return None, None
+
+    def parse(self, raw: bytes, counts: Counter[str]) -> RawScan:  # noqa: ARG002 - nothing is left out yet
+        """Read a message."""
+        scan = self._read(raw, cdr=self.cdr)
+        if not is_sane(scan):
+            msg = "angles or times that cannot be computed with"
+            raise wire.BrokenMessageError(msg)
+        return scan
+
+    def has_point_times(self, message: RawScan) -> bool:
+        """Whether the time of each beam is known."""
+        return has_beam_times(message)
+
+    def batches(
+        self, messages: Sequence[RawScan], starts: NDArray[np.float64], counts: Counter[str]
+    ) -> list[LidarBatch]:
+        """Return the points in the scan plane."""
+        return points_of_scans(messages, starts, counts)
+
+
+class MultiEchoScans(LaserScans):
+    """sensor_msgs/MultiEchoLaserScan."""
+
+    _read: ClassVar[Callable[..., RawScan]] = staticmethod(wire_scans.multi_echo_scan)
 
 
 def has_beam_times(scan: RawScan) -> bool:

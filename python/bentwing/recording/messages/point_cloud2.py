@@ -3,16 +3,19 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from bentwing.recording import point_times
 from bentwing.recording.batches import LidarBatch
+from bentwing.recording.messages import wire_clouds
+from bentwing.recording.messages.decoder import LidarDecoder
 from bentwing.recording.messages.wire import BrokenMessageError
 
 if TYPE_CHECKING:
-    from collections import Counter
+    from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
@@ -31,6 +34,52 @@ class Columns(NamedTuple):
     raw_times: NDArray[np.generic] | None
     intensity: NDArray[np.float32] | None
     ring: NDArray[np.uint16] | None
+
+
+class Cloud(NamedTuple):
+    """Valid points of a message."""
+
+    stamp_ns: int
+    columns: Columns
+
+
+class PointClouds(LidarDecoder[Cloud]):
+    """sensor_msgs/PointCloud2; without a reading all points have the header stamp."""
+
+    def point_times(
+        self, messages: Sequence[bytes], stamps_ns: Sequence[int]
+    ) -> tuple[str | None, TimeReading | None]:
+        """Decide on the last readable cloud; the first ones of a driver are often incomplete."""
+        steps = np.diff(np.array(stamps_ns, dtype=np.int64))
+        period = float(np.median(steps)) * 1e-9 if len(steps) and np.median(steps) > 0 else None
+        for raw in reversed(messages):
+            try:
+                cloud = wire_clouds.point_cloud(raw, cdr=self.cdr)
+                raw_times = columns(cloud, Counter()).raw_times
+            except BrokenMessageError:
+                continue
+            name = time_field(cloud)
+            if name is None or raw_times is None:
+                continue
+            reading = point_times.decide(name, raw_times, cloud.stamp_ns, period)
+            if reading is not None:
+                return str(reading), reading
+        return None, None
+
+    def parse(self, raw: bytes, counts: Counter[str]) -> Cloud:
+        """Read a message."""
+        cloud = wire_clouds.point_cloud(raw, cdr=self.cdr)
+        return Cloud(cloud.stamp_ns, columns(cloud, counts))
+
+    def batches(
+        self, messages: Sequence[Cloud], starts: NDArray[np.float64], counts: Counter[str]
+    ) -> list[LidarBatch]:
+        """Return the points, sorted by time, one batch per message."""
+        # Absolute point times are relative to the header's own stamp, zero or not.
+        return [
+            sweep(cloud.columns, self.reading, cloud.stamp_ns, start, counts)
+            for cloud, start in zip(messages, starts.tolist(), strict=True)
+        ]
 
 
 def time_field(cloud: RawCloud) -> str | None:

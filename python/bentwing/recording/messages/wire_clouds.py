@@ -4,14 +4,9 @@
 from __future__ import annotations
 
 import struct
-from typing import TYPE_CHECKING, NamedTuple
-
-import numpy as np
+from typing import NamedTuple
 
 from bentwing.recording.messages.wire import align, broken_if_malformed, header
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 MAX_POINT_FIELDS = 64
 
@@ -36,13 +31,6 @@ class RawCloud(NamedTuple):
     point_step: int
     row_step: int
     data: memoryview
-
-
-class RawLivox(NamedTuple):
-    """Livox CustomMsg; `points` is structured: offset_time (ns), x, y, z (m), reflectivity, line."""
-
-    stamp_ns: int
-    points: NDArray[np.void]
 
 
 @broken_if_malformed
@@ -78,34 +66,3 @@ def _point_field(raw: bytes, position: int, order: str, *, cdr: bool) -> tuple[R
     position = align(position + 5, 4, cdr=cdr)
     (count,) = struct.unpack_from(f"{order}I", raw, position)
     return RawField(name, offset, datatype, count), position + 4
-
-
-@broken_if_malformed
-def livox_custom(raw: bytes, *, cdr: bool) -> RawLivox:
-    """Read a livox_ros_driver(2)/CustomMsg."""
-    _, position, order = header(raw, cdr=cdr)
-    position = align(position, 8, cdr=cdr)
-    timebase_ns, n_points = struct.unpack_from(f"{order}QI", raw, position)
-    position = align(position + 12 + 4, 4, cdr=cdr)
-    (count,) = struct.unpack_from(f"{order}I", raw, position)
-    if count != n_points and n_points != 0:
-        msg = f"{count} points announced as {n_points}"
-        raise ValueError(msg)
-    dtype = _livox_dtype(order, 20 if cdr else 19)
-    # CDR pads between points, not after the last one.
-    body = raw[position + 4 :] + (b"\0" if cdr else b"")
-    points = np.frombuffer(body, dtype, count)
-    stamp = header(raw, cdr=cdr)[0]
-    # The offsets count from the time base, which some drivers leave at zero.
-    return RawLivox(timebase_ns if 0 < timebase_ns < 2**63 and stamp else stamp, points)
-
-
-def _livox_dtype(order: str, step: int) -> np.dtype[np.void]:
-    return np.dtype(
-        {
-            "names": ["offset_time", "x", "y", "z", "reflectivity", "line"],
-            "formats": [f"{order}u4", f"{order}f4", f"{order}f4", f"{order}f4", "u1", "u1"],
-            "offsets": [0, 4, 8, 12, 16, 18],
-            "itemsize": step,
-        }
-    )

@@ -11,8 +11,9 @@ import numpy as np
 from bentwing.base.run_record import read_record
 from bentwing.base.trajectory import Trajectory, read_tum
 from bentwing.evaluate.surfels import Surfels, surfels_of_cloud
+from bentwing.map.formats import MAP_SUFFIXES
 from bentwing.map.gps_time import adjusted_gps_origin
-from bentwing.map.read import MAP_SUFFIXES, read_parts
+from bentwing.map.read import read_parts
 from bentwing.report.view.levels import FINEST, Level, LevelPoints, coarser_levels
 
 if TYPE_CHECKING:

@@ -8,8 +8,9 @@ from bentwing.base import geometry
 from bentwing.base.errors import NotEnoughDataError, UsageError
 from bentwing.base.geodesy import LevelFrame, ProjectedSystem
 from bentwing.base.trajectory import Trajectory
-from bentwing.closing.georeference import GeoreferenceSettings, georeference
+from bentwing.closing.georeference.georeference import georeference
 from bentwing.closing.georeference.placement import Placement
+from bentwing.closing.georeference.settings import GeoreferenceSettings
 from bentwing.map.chunk import MapChunk
 from bentwing.recording.fixes import Fixes
 

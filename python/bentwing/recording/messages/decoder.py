@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""What turns the messages of one type into points."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import TYPE_CHECKING, ClassVar, Generic, Protocol, TypeVar
+
+if TYPE_CHECKING:
+    from collections import Counter
+    from collections.abc import Sequence
+
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from bentwing.recording.batches import LidarBatch
+    from bentwing.recording.point_times import TimeReading
+
+
+class Stamped(Protocol):
+    """A message that is read."""
+
+    @property
+    def stamp_ns(self) -> int:
+        """Stamp of its header."""
+
+
+Message = TypeVar("Message", bound=Stamped)
+
+
+class LidarDecoder(ABC, Generic[Message]):
+    """Decoder of a lidar's messages.
+
+    Parameters
+    ----------
+    cdr : ROS 2's encoding instead of ROS 1's
+    reading : of the points' times, where `point_times` found that it needs one
+    """
+
+    is_planar: ClassVar[bool] = False
+
+    def __init__(self, *, cdr: bool, reading: TimeReading | None = None) -> None:
+        self.cdr = cdr
+        self.reading = reading
+
+    @abstractmethod
+    def point_times(
+        self, messages: Sequence[bytes], stamps_ns: Sequence[int]
+    ) -> tuple[str | None, TimeReading | None]:
+        """Return how the time of each point is known.
+
+        Parameters
+        ----------
+        messages, stamps_ns : the first ones of the topic
+
+        Returns
+        -------
+        A sentence, None where the times are not known, and the reading of a time field if there is one.
+        """
+
+    @abstractmethod
+    def parse(self, raw: bytes, counts: Counter[str]) -> Message:
+        """Read a message.
+
+        Raises
+        ------
+        BrokenMessageError
+            It cannot be read.
+        """
+
+    def has_point_times(self, message: Message) -> bool:  # noqa: ARG002 - most types do not vary
+        """Whether a message tells when each of its points was measured."""
+        return True
+
+    @abstractmethod
+    def batches(
+        self, messages: Sequence[Message], starts: NDArray[np.float64], counts: Counter[str]
+    ) -> list[LidarBatch]:
+        """Return the points of messages with stamps (M,), s since the recording's start.
+
+        `counts` receives `returns` and, by reason, those that are left out.
+        """

@@ -1,0 +1,28 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""The names that a scenario chooses from, apart so that a help page shows them at once."""
+
+from __future__ import annotations
+
+from typing import Literal, TypeAlias
+
+SceneName: TypeAlias = Literal[
+    "courtyard", "compound", "office", "forest", "cave", "mine", "town", "walls", "dam",
+    "mocap", "carpark", "campus",
+]  # fmt: skip
+HeadName: TypeAlias = Literal[
+    "hokuyo-spin", "hokuyo-nod", "vlp16-fixed", "vlp16-side", "vlp16-motor"
+]
+SpinName: TypeAlias = Literal["steady", "plant"]
+FlightName: TypeAlias = Literal["tour", "survey", "stand"]
+RecordingFormat: TypeAlias = Literal["bag", "mcap", "db3"]
+ReceiverName: TypeAlias = Literal["rtk", "single"]
+EventName: TypeAlias = Literal[
+    "spin-stall",
+    "gusts",
+    "person",
+    "dropped-packets",
+    "strong-bias",
+    "motion-start",
+    "gap",
+    "motor-reversal",
+]

@@ -36,6 +36,7 @@ def command(
     threads: options.Threads = None,
     start: options.Start = None,
     duration: options.Duration = None,
+    force: options.Force = False,
     resume: options.Resume = False,
     quiet: options.Quiet = False,
 ) -> None:
@@ -59,6 +60,7 @@ def command(
         threads=threads,
         start=start,
         duration=duration,
+        force=True if force else None,
     )
     chosen = choose(settings, set_, payload, asked)
     progress = create_progress(quiet=quiet)

@@ -14,12 +14,13 @@ from bentwing.base.calibration import Calibration
 from bentwing.base.errors import EstimationError, UsageError
 from bentwing.base.estimate import Estimate
 from bentwing.base.trajectory import Trajectory, read_tum
+from bentwing.calibrate.inspection import Judgement
 from bentwing.closing.global_registration import GlobalSettings
 from bentwing.map.read import read_points
 from bentwing.map.sample import MapSample
 from bentwing.recording import Clock, ImuBatch, LidarBatch, Payload
 from bentwing.recording.described import described_mount
-from bentwing.run import pipeline
+from bentwing.run import check, pipeline
 from bentwing.run.run import Run
 from bentwing.run.settings import RunSettings, run_settings
 
@@ -33,9 +34,10 @@ class FakeRecording:
     duration = 10.0
     warnings = ("/imu: a gap of 0.2 s",)
     clock = Clock(ORIGIN_NS)
+    has_fixes = False
 
-    def __init__(self, paths, payload):
-        del payload
+    def __init__(self, paths, payload, *, strict):
+        del payload, strict
         self.paths = [Path(path) for path in paths]
         self.counts = Counter({"lidar.points": 10_000})
 
@@ -43,6 +45,9 @@ class FakeRecording:
         return self
 
     def __exit__(self, *_):
+        pass
+
+    def check(self):
         pass
 
     def batches(self, start=None, duration=None):
@@ -86,7 +91,8 @@ class FakeEstimator:
 
 @pytest.fixture
 def recording(tmp_path, monkeypatch):
-    monkeypatch.setattr(pipeline, "Recording", FakeRecording)
+    monkeypatch.setattr(check, "Recording", FakeRecording)
+    monkeypatch.setattr(check, "judge", lambda *_, **__: Judgement([], [], None, 1.0))
     monkeypatch.setattr(odometry, "create", lambda *_: FakeEstimator(), raising=False)
     (tmp_path / "yard.mcap").write_bytes(b"recording")
     return [tmp_path / "yard.mcap"]

@@ -70,6 +70,7 @@ def map_flights(
             pass  # none of them is mapped where another cannot be
     with RunFolder(Path(out), merging.to_json()) as folder:
         runs = [folder.path / RUNS / name for name in names]
+        mapped: list[str] = []
         for name, run, paths in zip(names, runs, flights, strict=True):
             if resume and _is_mapped(run, paths, settings):
                 shown.note(f"{name}: is mapped already")
@@ -77,7 +78,8 @@ def map_flights(
             shown.note(f"{name}:")
             with folder.stage(f"map {name}"):
                 run_recording(paths, run, settings, payload_file, resume=resume, progress=shown)
-        return merge_into(folder, open_sources(runs), merging, shown)
+            mapped.append(name)
+        return merge_into(folder, open_sources(runs), merging, shown, mapped)
 
 
 def flight_names(flights: Sequence[Sequence[Path]]) -> list[str]:

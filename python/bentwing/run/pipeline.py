@@ -17,7 +17,7 @@ from bentwing.run.check import opened
 from bentwing.run.checkpoint import Checkpoint
 from bentwing.run.choose import as_run_settings
 from bentwing.run.folder import RunFolder
-from bentwing.run.report import report_failure, report_run
+from bentwing.run.report import report_failure, report_run, say_warnings
 from bentwing.run.run import Run
 
 if TYPE_CHECKING:
@@ -132,7 +132,7 @@ def run_recording(
     ):
         part = RecordingPart(recording, settings.payload, settings.start, settings.duration)
         job = stages.Job(part, folder, settings, watch)
-        with _reported(folder):
+        with _reported(folder, watch):
             job = replace(job, prior=_open_inputs(job, payload_file))
             checkpoint = Checkpoint(folder)
             done, found = checkpoint.restore(resume=resume)
@@ -175,10 +175,12 @@ def _keep(job: stages.Job, found: Found, *, open_loop: bool = False) -> Found:
 
 
 @contextmanager
-def _reported(folder: RunFolder) -> Iterator[None]:
-    """Report a failure before it leaves."""
+def _reported(folder: RunFolder, progress: Progress) -> Iterator[None]:
+    """Say the warnings at the end, and report a failure before it leaves."""
     try:
         yield
     except BaseException as error:
         report_failure(folder, error)
         raise
+    finally:
+        say_warnings(progress, folder.record.found.warnings)

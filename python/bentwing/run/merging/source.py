@@ -51,6 +51,11 @@ class Source:
     inputs: list[dict[str, Any]]
     warnings: list[str]
 
+    @property
+    def told(self) -> list[str]:
+        """Warnings of the run, as a merged map repeats them."""
+        return [f"{self.name}: {warning}" for warning in self.warnings]
+
     @contextmanager
     def part(self) -> Iterator[RecordingPart]:
         """Open the part of the recording that the run used."""

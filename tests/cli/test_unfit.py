@@ -30,3 +30,15 @@ def test_force_maps_it_and_the_record_says_so(bentwing, unfit, tmp_path):
     assert said.code == 0, said.err
     record = json.loads((tmp_path / "run" / "run.json").read_text())
     assert record["settings"]["force"] is True
+    assert record["warnings"]
+    for warning in record["warnings"]:
+        assert said.err.count(warning) == 1
+
+
+@pytest.mark.slow
+def test_a_car_without_an_imu_is_told_nothing_about_one(bentwing, shared_data, tmp_path):
+    said = bentwing("map", shared_data / "drive_hdl64" / "start_16m.bag", "-o", tmp_path / "run")
+    assert said.code == 0, said.err
+    for warning in json.loads((tmp_path / "run" / "run.json").read_text())["warnings"]:
+        assert said.err.count(warning) == 1
+    assert "IMU" not in said.err

@@ -148,3 +148,14 @@ def test_no_flight_is_mapped_where_the_payload_fits_another_one_only(tmp_path, r
     with pytest.raises(BentwingError, match="describes an IMU"):
         map_flights([[first], [second]], tmp_path / "out", run_settings(payload=HEAD))
     assert not (tmp_path / "out").exists()
+
+
+def test_a_folder_of_a_run_is_not_touched_by_a_refused_one(tmp_path, ros1):
+    scans = [("/scan", i / 40, ros1.scan(i / 40)) for i in range(40)]
+    path, out = ros1.write(tmp_path / "2d.bag", scans), tmp_path / "out"
+    out.mkdir()
+    (out / "run.json").write_text("{}")
+    with pytest.raises(RecordingError, match="give --force"):
+        pipeline.map_recording(path, Payload(), out)
+    assert [file.name for file in out.iterdir()] == ["run.json"]
+    assert (out / "run.json").read_text() == "{}"

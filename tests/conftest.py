@@ -27,6 +27,7 @@ hypothesis.settings.load_profile("bentwing")
 pytest_plugins = ["support.skips"]
 
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
+SHARED_CASES = SHARED_DATA.parent / "cases"
 
 LIVOX_POINT = (
     "uint32 offset_time\nfloat32 x\nfloat32 y\nfloat32 z\nuint8 reflectivity\nuint8 tag\nuint8 line"
@@ -46,6 +47,14 @@ def shared_data():
     if not SHARED_DATA.is_dir():
         pytest.skip(f"real recordings are not at {SHARED_DATA}")
     return SHARED_DATA
+
+
+@pytest.fixture(scope="session")
+def shared_cases():
+    """Folder of small real recordings with one fault each; tests are skipped where it is absent."""
+    if not SHARED_CASES.is_dir():
+        pytest.skip(f"real recordings are not at {SHARED_CASES}")
+    return SHARED_CASES
 
 
 def _store(ros1: bool):

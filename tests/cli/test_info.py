@@ -61,7 +61,9 @@ def test_several_parts_are_one_recording(bentwing, tmp_path, ros1, head_entries)
 
 
 def test_the_planar_rover_is_refused_for_its_real_defects(bentwing, shared_data):
-    found = json.loads(bentwing("info", shared_data / "planar_rover" / "loop2", "--json").out)
+    said = bentwing("info", shared_data / "planar_rover" / "loop2", "--json")
+    found = json.loads(said.out)
+    assert said.code == 3
     assert not found["is_fit"]
     defects = "\n".join(found["defects"])
     for text in (
@@ -75,6 +77,14 @@ def test_the_planar_rover_is_refused_for_its_real_defects(bentwing, shared_data)
     ):
         assert text in defects
     assert len(found["defects"]) == 5
+
+
+def test_the_page_of_an_unfit_recording_is_printed_and_the_exit_code_is_3(bentwing, tmp_path, ros1):
+    scans = [("/scan", i / 40, ros1.scan(i / 40)) for i in range(40)]
+    said = bentwing("info", ros1.write(tmp_path / "2d.bag", scans))
+    assert said.code == 3
+    assert "without IMU and encoder" in said.out
+    assert "not fit for mapping: 1 defect" in said.out
 
 
 def test_the_ouster_file_is_refused_for_its_two_clocks(bentwing, shared_data):

@@ -62,6 +62,18 @@ def test_the_record_of_the_run_agrees_with_its_files(mapped, office):
     assert 0 < record["timings"]["estimate"] < record["timings"]["total"]
 
 
+def test_the_start_of_a_good_flight_is_a_note_and_no_warning(mapped):
+    done, out = mapped
+    record = record_of(out)
+    assert record["warnings"] == []
+    assert "warning" not in done.stderr
+    (note,) = record["notes"]
+    assert note.startswith("the head had turned once by ")
+    page = (out / "report.html").read_text()
+    assert "Map finished, no warnings" in page
+    assert f"Note: {note}." in page
+
+
 def test_the_report_stands_alone(mapped):
     page = (mapped[1] / "report.html").read_text()
     assert "<html" in page

@@ -27,6 +27,7 @@ class Estimate(Value):
     counts : what was used and what was dropped
     timings : seconds of wall time by stage
     health : sentences about what makes the estimate worse than usual, breaks apart
+    notes : sentences about what is usual and worth knowing
     breaks : where the recording breaks
     segments : first and last time of each stretch without a break, s; between them the trajectory
         is a guess
@@ -38,6 +39,7 @@ class Estimate(Value):
     counts: dict[str, int] = field(default_factory=dict)
     timings: dict[str, float] = field(default_factory=dict)
     health: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
     breaks: list[Break] = field(default_factory=list)
     segments: list[tuple[float, float]] = field(default_factory=list)
 

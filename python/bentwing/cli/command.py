@@ -22,7 +22,7 @@ _COLUMN = 24  # width of names, the same in all groups
 _EXIT_CODES = """\
   0    done
   2    the call is wrong
-  3    an input cannot be used
+  3    an input cannot be used, or a recording is unfit for mapping
   4    the estimation failed; what was computed is kept
   130  interrupted; what was computed is kept"""
 

@@ -3,7 +3,10 @@
 
 import typer
 
+from bentwing.base.errors import RecordingError
 from bentwing.cli import options
+
+UNFIT = RecordingError.exit_code
 
 EXAMPLES = (
     "bentwing info recording.bag",
@@ -14,7 +17,7 @@ EXAMPLES = (
 
 def command(
     recording: options.Recording, *, payload: options.Payload = None, as_json: options.Json = False
-) -> None:
+) -> int | None:
     """Check a recording: topics, rates, gaps, spin, stalls and visible structure, with a verdict."""
     # slow to import, so only when it is needed
     import dataclasses
@@ -28,7 +31,8 @@ def command(
     inspection = inspect(recording, payload)
     if as_json:
         typer.echo(json.dumps({**dataclasses.asdict(inspection), "is_fit": inspection.is_fit}))
-        return
-    console = Console()
-    for part in page(inspection):
-        console.print(part)
+    else:
+        console = Console()
+        for part in page(inspection):
+            console.print(part)
+    return None if inspection.is_fit else UNFIT

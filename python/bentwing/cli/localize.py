@@ -37,6 +37,7 @@ def command(
     threads: options.Threads = None,
     start: options.Start = None,
     duration: options.Duration = None,
+    force: options.Force = False,
     resume: options.Resume = False,
     quiet: options.Quiet = False,
 ) -> None:
@@ -60,6 +61,7 @@ def command(
         threads=threads,
         start=start,
         duration=duration,
+        force=True if force else None,
     )
     chosen = choose(settings, set_, payload, options_given)
     progress = create_progress(quiet=quiet)

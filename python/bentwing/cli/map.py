@@ -41,6 +41,7 @@ def command(
     threads: options.Threads = None,
     start: options.Start = None,
     duration: options.Duration = None,
+    force: options.Force = False,
     resume: options.Resume = False,
     quiet: options.Quiet = False,
     print_settings: Annotated[
@@ -75,6 +76,7 @@ def command(
         threads=threads,
         start=start,
         duration=duration,
+        force=True if force else None,
     )
     chosen = choose(settings, set_, payload, options_given)
     if print_settings:

@@ -147,6 +147,11 @@ ControlPoints = Annotated[
     option(EARTH, metavar="FILE", help="CSV of surveyed points: id,x,y,z,radius[,use]."),
 ]
 
+Force = Annotated[
+    bool,
+    option(INPUT, "--force", help="Map a recording that `bentwing info` calls unfit."),
+]
+
 Threads = Annotated[
     int | None,
     option(

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from bentwing.recording.batches import Batch
 
-CHECKED = 20.0  # s of the recording's beginning
+CHECKED = 60.0  # s of the recording's beginning; more would not change the judgement
 MIN_SAMPLES = 20
 MAX_RATE = 35.0  # rad/s, full scale of the fastest common gyros
 # m/s², median length; 0.3 m off the axis of a spin of 15 rad/s it is seven times gravity.

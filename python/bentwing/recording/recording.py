@@ -85,7 +85,7 @@ class Recording:
         for role, peeked in self._peeks.items():
             _log.info("%s: %s (%s)", role, peeked.topic.name, peeked.topic.type)
         if self.strict:
-            self._check_fitness()
+            self.check()
 
     def _peek(self, role: str, topic: TopicInfo, *, is_alone: bool) -> Peek:
         if topic.type not in PACKET_TYPES:
@@ -95,7 +95,14 @@ class Recording:
         clock = self._peeks["lidar"].packet_clock
         return peek_imu(self._source, topic, self.payload.lidar, clock)
 
-    def _check_fitness(self) -> None:
+    def check(self) -> None:
+        """Refuse what cannot be mapped, and be strict from now on.
+
+        Raises
+        ------
+        RecordingError, PayloadError
+        """
+        self.strict = True
         if "imu" in self._peeks and not self.payload.places_lidar_on_imu:
             raise PayloadError(problems.mount(self.imu_topic or ""))
         if self.point_times is None:
@@ -106,7 +113,7 @@ class Recording:
             self._check_imu()
 
     def _check_imu(self) -> None:
-        samples = imu_units.collect(self._first_imu_batches())
+        samples = imu_units.collect(self.imu_batches())
         if found := imu_units.problems(*samples):
             msg = f"{self.imu_topic}: {'; '.join(found)}"
             raise RecordingError(msg)
@@ -120,8 +127,10 @@ class Recording:
         found = [problems.clocks(lidar, other) for other in others]
         return [problem for problem in found if problem is not None]
 
-    def _first_imu_batches(self) -> Iterator[Batch]:
+    def imu_batches(self) -> Iterator[Batch]:
         """Yield the IMU's samples alone, in a pass of their own that leaves the counts as is."""
+        if "imu" not in self._peeks:
+            return iter(())
         streams = {self._peeks["imu"].topic.name: self._open_streams(["imu"])["imu"]}
         messages = self._source.messages(streams)
         return group_into_slots(messages, streams)
@@ -160,6 +169,11 @@ class Recording:
     def encoder_topic(self) -> str | None:
         """The encoder's topic, None without encoder."""
         return self._topic("encoder")
+
+    @property
+    def has_fixes(self) -> bool:
+        """Whether the recording has the topic of GNSS fixes that the payload names."""
+        return self._gnss_topic() is not None
 
     @property
     def point_times(self) -> str | None:

@@ -40,6 +40,7 @@ def verdict(record: Mapping[str, Any]) -> str:
         sentence = _quality(record.get("windows") or [])
     items = "".join(f"<li>{escape(warning)}</li>" for warning in warnings)
     listed = f"<ul>{items}</ul>" if items else ""
+    listed += "".join(f"<p>Note: {escape(str(note))}.</p>" for note in record.get("notes") or [])
     return (
         f'<div class="verdict {level}"><strong>{escape(headline)}</strong>'
         f"<p>{escape(sentence)}</p>{listed}</div>"

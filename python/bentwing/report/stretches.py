@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bentwing.base.spans import name_spans, spans_of
+
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
@@ -24,15 +26,7 @@ def degenerate(
 
 def degenerate_spans(windows: Sequence[Mapping[str, Any]]) -> list[tuple[float, float]]:
     """First and last time, s, of each stretch of such windows."""
-    spans: list[tuple[float, float]] = []
-    before = 0.0
-    for window in windows:
-        end = float(window["time"])
-        if window.get("degenerate"):
-            first = spans.pop()[0] if spans and spans[-1][1] == before else before
-            spans.append((first, end))
-        before = end
-    return spans
+    return spans_of((float(w["time"]), bool(w.get("degenerate"))) for w in windows)
 
 
 def spans_sentence(spans: Sequence[tuple[float, float]]) -> str:
@@ -40,9 +34,7 @@ def spans_sentence(spans: Sequence[tuple[float, float]]) -> str:
     if not spans:
         return "Every direction of motion was seen all the time."
     total = sum(last - first for first, last in spans)
-    first = ", ".join(f"{a:.0f} to {b:.0f} s" for a, b in spans[:5])
-    more = f" and {len(spans) - 5} more stretches" if len(spans) > 5 else ""
     return (
-        f"Red: for {total:.0f} s the surroundings left a direction of motion unseen ({first}{more}); "
-        "inertial data and smoothness carried it there."
+        f"Red: for {total:.0f} s the surroundings left a direction of motion unseen "
+        f"({name_spans(spans)}); inertial data and smoothness carried it there."
     )

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 NAME = "checkpoint.npz"
 _TRAJECTORY = ("times", "positions", "quats_xyzw")
-_OF_ESTIMATE = ("windows", "counts", "timings", "health", "breaks", "segments")
+_OF_ESTIMATE = ("windows", "counts", "timings", "health", "notes", "breaks", "segments")
 _CORRECTIONS = ("localization", "loop_closure", "merging")
 # What must be the same for a run to go on; the number of threads changes no bit.
 _FREE = frozenset({"threads"})
@@ -60,7 +60,7 @@ class Checkpoint:
             "estimate": {name: getattr(estimate, name) for name in _OF_ESTIMATE},
             "reading": found.reading,
             "corrections": {name: getattr(found, name) for name in _CORRECTIONS},
-            "notes": found.notes,
+            "stage_warnings": found.stage_warnings,
             "timings": record.timings,
             "files": [name for name in record.files if name != NAME],
         }
@@ -100,7 +100,7 @@ class Checkpoint:
             return None, Found()
         except (OSError, ValueError, KeyError, BadZipFile) as error:
             note = f"{self._path}: cannot be read ({error}); the run begins anew"
-            return None, Found(notes=(note,))
+            return None, Found(stage_warnings=(note,))
         self._require_same(described["asked"])
         if not all((self._folder.path / name).exists() for name in described["files"]):
             return None, Found()
@@ -146,5 +146,5 @@ def _found(arrays: dict[str, Any], described: dict[str, Any]) -> Found:
         Reading(**described["reading"]),
         Spin(*arrays["spin"].tolist()),
         **described["corrections"],
-        notes=tuple(described["notes"]),
+        stage_warnings=tuple(described["stage_warnings"]),
     )

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from bentwing.base.errors import UsageError
 from bentwing.base.progress import Progress, as_progress
 from bentwing.base.run_record import read_record
+from bentwing.run.check import opened
 from bentwing.run.folder import RunFolder
 from bentwing.run.merging import merge_into, open_sources
 from bentwing.run.merging.source import distinct_names
@@ -64,8 +65,12 @@ def map_flights(
         loop_closure=settings.closing,
         flights={n: [p.resolve() for p in f] for n, f in zip(names, flights, strict=True)},
     )
+    for paths in flights:
+        with opened(paths, settings):
+            pass  # none of them is mapped where another cannot be
     with RunFolder(Path(out), merging.to_json()) as folder:
         runs = [folder.path / RUNS / name for name in names]
+        mapped: list[str] = []
         for name, run, paths in zip(names, runs, flights, strict=True):
             if resume and _is_mapped(run, paths, settings):
                 shown.note(f"{name}: is mapped already")
@@ -73,7 +78,8 @@ def map_flights(
             shown.note(f"{name}:")
             with folder.stage(f"map {name}"):
                 run_recording(paths, run, settings, payload_file, resume=resume, progress=shown)
-        return merge_into(folder, open_sources(runs), merging, shown)
+            mapped.append(name)
+        return merge_into(folder, open_sources(runs), merging, shown, mapped)
 
 
 def flight_names(flights: Sequence[Sequence[Path]]) -> list[str]:

@@ -91,7 +91,7 @@ class Found:
     placed : where the map is on the Earth, or in the coordinates of a prior map
     map : the map
     runs : of a merged map, the runs in it, for run.json
-    notes : sentences of the stages behind the estimate
+    stage_warnings : sentences of the stages behind the estimate
     failure : why the last stage did not finish
     """
 
@@ -104,7 +104,7 @@ class Found:
     placed: Placed | None = None
     map: WrittenMap | None = None
     runs: tuple[Record, ...] = ()
-    notes: tuple[str, ...] = ()
+    stage_warnings: tuple[str, ...] = ()
     failure: BaseException | None = None
 
     @property
@@ -115,7 +115,7 @@ class Found:
     @property
     def warnings(self) -> list[str]:
         """Sentences about the health of the result, each once."""
-        sentences = [*self.reading.warnings, *self.notes]
+        sentences = [*self.reading.warnings, *self.stage_warnings]
         if self.estimate is not None:
             sentences[len(self.reading.warnings) : len(self.reading.warnings)] = (
                 self.estimate.warnings
@@ -142,6 +142,7 @@ class Found:
         return {
             "counts": counts,
             "warnings": self.warnings,
+            "notes": [] if estimate is None else estimate.notes,
             "calibration": None if estimate is None else estimate.calibration,
             "localization": localization,
             "loop_closure": self.loop_closure,

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING
 from bentwing import odometry
 from bentwing.base.progress import as_progress
 from bentwing.closing.localize import read_prior_map
-from bentwing.recording import Recording
 from bentwing.recording.preprocess import RecordingPart
 from bentwing.run import stages
+from bentwing.run.check import opened
 from bentwing.run.checkpoint import Checkpoint
 from bentwing.run.choose import as_run_settings
 from bentwing.run.folder import RunFolder
-from bentwing.run.report import report_failure, report_run
+from bentwing.run.report import report_failure, report_run, say_warnings
 from bentwing.run.run import Run
 
 if TYPE_CHECKING:
@@ -50,6 +50,7 @@ def map_recording(
     threads: int | None = None,
     start: float | None = None,
     duration: float | None = None,
+    force: bool = False,
     resume: bool = False,
     progress: Progress | None = None,
 ) -> Run:
@@ -73,6 +74,7 @@ def map_recording(
         some of it, over which the other arguments stand; default: the defaults
     threads : of the estimator; default: all cores
     start, duration : s, the part of the recording to use; default: all of it
+    force : map a recording that `bentwing info` calls unfit all the same
     resume : go on behind the last stage that an earlier run in `out` has finished, if there is one
     progress : what to tell the user meanwhile; default: nothing
 
@@ -94,6 +96,7 @@ def map_recording(
         threads=threads,
         start=start,
         duration=duration,
+        force=True if force else None,
     )
     described = payload if isinstance(payload, (str, Path)) else None
     found = run_recording(paths, out, chosen, described, resume=resume, progress=progress)
@@ -124,12 +127,12 @@ def run_recording(
     )
     watch = as_progress(progress)
     with (
-        Recording(paths, settings.payload) as recording,
+        opened(paths, settings) as recording,
         RunFolder(Path(out), settings.to_json()) as folder,
     ):
         part = RecordingPart(recording, settings.payload, settings.start, settings.duration)
         job = stages.Job(part, folder, settings, watch)
-        with _reported(folder):
+        with _reported(folder, watch):
             job = replace(job, prior=_open_inputs(job, payload_file))
             checkpoint = Checkpoint(folder)
             done, found = checkpoint.restore(resume=resume)
@@ -172,10 +175,12 @@ def _keep(job: stages.Job, found: Found, *, open_loop: bool = False) -> Found:
 
 
 @contextmanager
-def _reported(folder: RunFolder) -> Iterator[None]:
-    """Report a failure before it leaves."""
+def _reported(folder: RunFolder, progress: Progress) -> Iterator[None]:
+    """Say the warnings at the end, and report a failure before it leaves."""
     try:
         yield
     except BaseException as error:
         report_failure(folder, error)
         raise
+    finally:
+        say_warnings(progress, folder.record.found.warnings)

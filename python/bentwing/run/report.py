@@ -14,6 +14,9 @@ from bentwing.report.picture import render_top, write_png
 from bentwing.report.views import overhead_points
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from bentwing.base.progress import Progress
     from bentwing.run.folder import RunFolder
     from bentwing.run.found import Found
 
@@ -31,6 +34,12 @@ def report_run(folder: RunFolder, found: Found, trajectory: Trajectory | None = 
     with folder.stage("report"):
         folder.save()
         _write(folder, found, trajectory, complete=True)
+
+
+def say_warnings(progress: Progress, warnings: Iterable[str]) -> None:
+    """Say what the user must know of a run before using its result."""
+    for text in warnings:
+        progress.note(f"warning: {text}")
 
 
 def report_failure(folder: RunFolder, error: BaseException) -> None:

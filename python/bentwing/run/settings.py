@@ -94,6 +94,10 @@ class RunSettings(MapSettings):
     duration: Annotated[float | None, Unit("s")] = Field(
         default=None, ge=0, description="length of the part to use; default: all of the recording"
     )
+    force: bool = Field(
+        default=False,
+        description="whether a recording that `bentwing info` calls unfit is mapped all the same",
+    )
     continuous: ContinuousSettings = Field(
         default=ContinuousSettings(), description="settings of the continuous estimator"
     )

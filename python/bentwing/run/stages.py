@@ -112,7 +112,7 @@ def close(job: Job, found: Found) -> Found:
         found,
         estimate=closed.estimate,
         loop_closure=closed.record,
-        notes=(*found.notes, *closed.warnings),
+        stage_warnings=(*found.stage_warnings, *closed.warnings),
     )
 
 
@@ -148,13 +148,13 @@ def place_on_earth(job: Job, found: Found) -> Found:
             )
         except NotEnoughDataError as error:
             note = f"{error}; the map stays in its own frame"
-            return replace(found, notes=(*found.notes, note))
+            return replace(found, stage_warnings=(*found.stage_warnings, note))
     if placed is None:
         return found
     if placed.trajectory is not estimate.trajectory:
         estimate = replace(estimate, trajectory=placed.trajectory)
-    notes = (*found.notes, *placed.warnings)
-    return replace(found, estimate=estimate, placed=placed, notes=notes)
+    warnings = (*found.stage_warnings, *placed.warnings)
+    return replace(found, estimate=estimate, placed=placed, stage_warnings=warnings)
 
 
 def make_map(job: Job, found: Found) -> Found:

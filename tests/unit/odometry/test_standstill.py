@@ -34,6 +34,16 @@ def test_a_rest_before_the_first_turn_is_none():
     assert watched(*turning()).stalls(39.0) == []
 
 
+def test_the_first_turn_is_when_the_head_has_been_once_around():
+    times, rate = turning()  # 6 rad/s from 3 s on
+    assert watched(times, rate).first_turn == pytest.approx(3.0 + 2 * np.pi / 6.0, abs=0.3)
+
+
+def test_a_head_at_rest_with_a_biased_gyro_has_no_first_turn():
+    times = np.arange(0.0, 200.0, 0.005)
+    assert watched(times, np.full(len(times), 0.05)).first_turn is None
+
+
 def test_a_stall_that_lasts_has_no_end_yet():
     watch = watched(*turning((20.0, 27.0)))
     assert watch.stalls(20.3) == []

@@ -3,6 +3,7 @@ import copy
 import json
 import pickle
 from collections import Counter
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -13,13 +14,15 @@ from bentwing import odometry
 from bentwing.base.calibration import Calibration
 from bentwing.base.errors import EstimationError, UsageError
 from bentwing.base.estimate import Estimate
+from bentwing.base.progress import Progress
 from bentwing.base.trajectory import Trajectory, read_tum
+from bentwing.calibrate.inspection import Judgement
 from bentwing.closing.global_registration import GlobalSettings
 from bentwing.map.read import read_points
 from bentwing.map.sample import MapSample
 from bentwing.recording import Clock, ImuBatch, LidarBatch, Payload
 from bentwing.recording.described import described_mount
-from bentwing.run import pipeline
+from bentwing.run import check, pipeline
 from bentwing.run.run import Run
 from bentwing.run.settings import RunSettings, run_settings
 
@@ -33,9 +36,10 @@ class FakeRecording:
     duration = 10.0
     warnings = ("/imu: a gap of 0.2 s",)
     clock = Clock(ORIGIN_NS)
+    has_fixes = False
 
-    def __init__(self, paths, payload):
-        del payload
+    def __init__(self, paths, payload, *, strict):
+        del payload, strict
         self.paths = [Path(path) for path in paths]
         self.counts = Counter({"lidar.points": 10_000})
 
@@ -43,6 +47,9 @@ class FakeRecording:
         return self
 
     def __exit__(self, *_):
+        pass
+
+    def check(self):
         pass
 
     def batches(self, start=None, duration=None):
@@ -86,7 +93,8 @@ class FakeEstimator:
 
 @pytest.fixture
 def recording(tmp_path, monkeypatch):
-    monkeypatch.setattr(pipeline, "Recording", FakeRecording)
+    monkeypatch.setattr(check, "Recording", FakeRecording)
+    monkeypatch.setattr(check, "judge", lambda *_, **__: Judgement([], [], None, 1.0))
     monkeypatch.setattr(odometry, "create", lambda *_: FakeEstimator(), raising=False)
     (tmp_path / "yard.mcap").write_bytes(b"recording")
     return [tmp_path / "yard.mcap"]
@@ -118,6 +126,24 @@ def test_a_run_leaves_all_files_of_the_contract(tmp_path, recording):
     assert set(record["timings"]) == {"inputs", "estimate", "loops", "map", "report", "total"}
     assert "Map finished, with 2 warnings" in run.report_path.read_text()
     assert run.warnings == ("/imu: a gap of 0.2 s", "one plane only at 3 s")
+
+
+class Notes(Progress):
+    def __init__(self):
+        self.texts = []
+
+    def note(self, text):
+        self.texts.append(text)
+
+
+@pytest.mark.parametrize("fail_at", [np.inf, 5.0])
+def test_every_warning_of_a_run_is_said_once(tmp_path, recording, monkeypatch, fail_at):
+    monkeypatch.setattr(FakeEstimator, "fail_at", fail_at)
+    shown = Notes()
+    with suppress(EstimationError):
+        pipeline.map_recording(recording, PAYLOAD, tmp_path / "out", progress=shown)
+    warnings = [text for text in shown.texts if text.startswith("warning: ")]
+    assert warnings == ["warning: /imu: a gap of 0.2 s", "warning: one plane only at 3 s"]
 
 
 def test_a_part_of_the_recording_and_a_spacing_can_be_asked_for(tmp_path, recording):

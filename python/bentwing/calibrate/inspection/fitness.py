@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""Judge what was read of a recording: what prevents mapping, and what may make the map worse."""
+"""Judge a recording: what prevents mapping, and what may make the map worse.
+
+`bentwing info` and `bentwing map` judge by the same small part: the first minute of the IMU, all of
+it for a 2D lidar, and the lidar's first return.
+"""
 
 from __future__ import annotations
 
@@ -8,55 +12,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing.calibrate.inspection.planar import MIN_CORRELATION, level_share
+from bentwing.calibrate.inspection.planar import MIN_CORRELATION, ScanTurns, level_share
 from bentwing.recording import imu_units, problems
-from bentwing.recording.messages.lidar_messages import is_planar
+from bentwing.recording.batches import LidarBatch
+from bentwing.recording.messages.lidar_messages import LASER_SCAN, is_planar
 from bentwing.recording.preprocess import find_static_start
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from numpy.typing import NDArray
 
-    from bentwing.calibrate.inspection.planar import ScanTurns
     from bentwing.calibrate.inspection.spin import Spin
-    from bentwing.recording.batches import EncoderBatch, ImuBatch
     from bentwing.recording.recording import Recording
 
 Stretch = tuple[float, float]
 MIN_IMU_RATE_HZ = 90.0
-JUDGED = 60.0  # s of IMU samples; more would not change the judgement of their units
 ALWAYS_LEVEL = 0.95  # share of time
-
-
-@dataclass(frozen=True, slots=True)
-class Samples:
-    """The small streams of a recording, whole: IMU (M,), (M, 3), (M, 3); encoder (K,), (K,)."""
-
-    imu_times: NDArray[np.float64]
-    gyro: NDArray[np.float64]
-    accel: NDArray[np.float64]
-    encoder_times: NDArray[np.float64]
-    encoder_angles: NDArray[np.float64]
-    scan_turns: ScanTurns | None
-
-    @classmethod
-    def joined(
-        cls,
-        imu: Sequence[ImuBatch],
-        encoder: Sequence[EncoderBatch],
-        scan_turns: ScanTurns | None,
-    ) -> Samples:
-        """Return the batches of a whole recording as one."""
-        empty, empty3 = np.zeros(0), np.zeros((0, 3))
-        return cls(
-            np.concatenate([empty, *(batch.times for batch in imu)]),
-            np.concatenate([empty3, *(batch.gyro for batch in imu)]),
-            np.concatenate([empty3, *(batch.accel for batch in imu)]),
-            np.concatenate([empty, *(batch.times for batch in encoder)]),
-            np.concatenate([empty, *(batch.angles for batch in encoder)]),
-            scan_turns,
-        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,37 +37,59 @@ class Judgement:
     ----------
     defects, warnings : what prevents mapping, what may make the map worse
     static_start : (start, end) s, if any
-    gyro : (M, 3) rad/s, imu frame, repaired where its unit is certainly wrong
+    gyro_scale : what makes rad/s of the gyro where its unit is certainly wrong, else 1
     """
 
     defects: list[str]
     warnings: list[str]
     static_start: Stretch | None
+    gyro_scale: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Imu:
+    """Samples of the IMU: (M,) s, (M, 3), (M, 3), in the units of the recording."""
+
+    times: NDArray[np.float64]
     gyro: NDArray[np.float64]
+    accel: NDArray[np.float64]
+
+    @property
+    def beginning(self) -> tuple[NDArray[np.float64], ...]:
+        """Times, gyro and accel of the part by which units are judged."""
+        n = int(np.searchsorted(self.times, self.times[0] + imu_units.CHECKED))
+        return self.times[:n], self.gyro[:n], self.accel[:n]
 
 
-def judge(recording: Recording, samples: Samples, *, has_payload: bool) -> Judgement:
-    """Judge a recording by the samples of one pass; defects say how to repair them."""
+def judge(recording: Recording, *, has_payload: bool) -> Judgement:
+    """Judge a recording by a small part of it; defects say how to repair them.
+
+    Parameters
+    ----------
+    recording : that is not strict
+    has_payload : whether the sensor head is described, so that what depends on the mount can be told
+    """
+    can_be_level = is_planar(recording.lidar_type)
+    can_be_level &= recording.encoder_topic is None
+    seconds = np.inf if can_be_level else imu_units.CHECKED
+    imu = _Imu(*imu_units.collect(recording.imu_batches(), seconds))
     defects = _time_defects(recording) + recording.clock_problems()
     warnings: list[str] = []
-    static, gyro = None, samples.gyro
-    if len(samples.imu_times):
-        n = int(np.searchsorted(samples.imu_times, samples.imu_times[0] + JUDGED))
-        judged = samples.imu_times[:n], samples.gyro[:n], samples.accel[:n]
+    static, scale = None, 1.0
+    if len(imu.times):
+        judged = imu.beginning
         defects += [f"{recording.imu_topic}: {text}" for text in imu_units.problems(*judged)]
-        gyro = gyro * imu_units.gyro_scale(*judged)
-        defects += _mirrored(recording, samples, gyro)
+        scale = imu_units.gyro_scale(*judged)
         start = find_static_start(judged[0], *imu_units.in_si(*judged))
         static = None if start is None else (start.start, start.end)
-        warnings += _imu_rate(recording, samples) + _start_warnings(static)
+        warnings += _imu_rate(recording, judged[0]) + _start_warnings(static)
         if (mirrored := imu_units.mirrored_axis(judged[0], *imu_units.in_si(*judged))) is not None:
             warnings.append(f"{recording.imu_topic}: {mirrored}")
-    planar = _planar_defects(recording, samples)
-    if planar and not has_payload and not _scans_turn(recording, samples, gyro):
-        planar, warnings = [], [*warnings, _unknown_plane(recording)]
-    defects += planar
-    defects += _mount_defects(recording, has_payload=has_payload)
-    return Judgement(defects, warnings, static, gyro)
+    if can_be_level:
+        found, unknown = _planar(recording, imu, scale, has_payload=has_payload)
+        defects, warnings = defects + found, warnings + unknown
+    defects += _mount_defects(recording, has_payload=has_payload) + _blind(recording)
+    return Judgement(defects, warnings, static, scale)
 
 
 def _start_warnings(static: Stretch | None) -> list[str]:
@@ -117,30 +109,11 @@ def _time_defects(recording: Recording) -> list[str]:
     )
 
 
-def _mirrored(recording: Recording, samples: Samples, gyro: NDArray[np.float64]) -> list[str]:
-    """Compare the turn of a level 2D lidar from scan to scan with the gyro about its normal."""
-    agreement = _scan_agreement(recording, samples, gyro)
-    if agreement is None or agreement > -MIN_CORRELATION:
+def _imu_rate(recording: Recording, times: NDArray[np.float64]) -> list[str]:
+    if len(times) < 2:
         return []
-    return [
-        f"{recording.imu_topic}: the gyro turns against the scans of {recording.lidar_topic} about "
-        "the scan plane's normal, so one axis is mirrored; flip the sign of the gyro's axis along "
-        "the normal in the driver, or, if the lidar is mounted upside down, say so in T_imu_lidar"
-    ]
-
-
-def _scan_agreement(
-    recording: Recording, samples: Samples, gyro: NDArray[np.float64]
-) -> float | None:
-    if samples.scan_turns is None:
-        return None
-    rates = gyro @ _R_imu_lidar(recording)[:, 2]
-    return samples.scan_turns.agreement(samples.imu_times, rates - np.median(rates))
-
-
-def _imu_rate(recording: Recording, samples: Samples) -> list[str]:
-    rate_hz = 1.0 / max(float(np.median(np.diff(samples.imu_times))), 1e-9)
-    if len(samples.imu_times) < 2 or rate_hz >= MIN_IMU_RATE_HZ:
+    rate_hz = 1.0 / max(float(np.median(np.diff(times))), 1e-9)
+    if rate_hz >= MIN_IMU_RATE_HZ:
         return []
     return [
         f"{recording.imu_topic}: {rate_hz:.0f} Hz is slow for a moving lidar; set the IMU to 100 "
@@ -148,32 +121,68 @@ def _imu_rate(recording: Recording, samples: Samples) -> list[str]:
     ]
 
 
-def _planar_defects(recording: Recording, samples: Samples) -> list[str]:
-    """Return why a 2D lidar cannot make a 3D map, if it cannot."""
-    if not is_planar(recording.lidar_type) or recording.encoder_topic is not None:
-        return []
-    if not len(samples.imu_times):
+def _planar(
+    recording: Recording, imu: _Imu, gyro_scale: float, *, has_payload: bool
+) -> tuple[list[str], list[str]]:
+    """Return defects and warnings on a 2D lidar that no encoder turns."""
+    if not len(imu.times):
         return [
             f"{recording.lidar_topic}: a 2D lidar without IMU and encoder; nothing tells how its "
             "scan plane moves, record one of them too"
-        ]
-    half = max(1, int(0.25 / max(float(np.median(np.diff(samples.imu_times))), 1e-6)))
-    kernel = np.ones(2 * half + 1)
-    smooth = np.column_stack([np.convolve(axis, kernel, "same") for axis in samples.accel.T])
-    if level_share(smooth, _R_imu_lidar(recording)) < ALWAYS_LEVEL:
-        return []
+        ], []
+    if not _is_level(recording, imu):
+        return [], []
+    agreement = _scan_agreement(recording, imu, gyro_scale)
+    # A level plane turns with or against the gyro, in any mount.
+    turns = agreement is not None and abs(agreement) >= MIN_CORRELATION
+    if not has_payload and not turns:
+        return [], [_unknown_plane(recording)]
+    defects = [] if agreement is None or agreement > -MIN_CORRELATION else [_mirrored(recording)]
     return [
+        *defects,
         f"{recording.lidar_topic}: a 2D lidar whose scan plane stays level sees one slice of the "
-        "surroundings and cannot make a 3D map; spin or nod the lidar, or use a 2D SLAM program"
-    ]
+        "surroundings and cannot make a 3D map; spin or nod the lidar, or use a 2D SLAM program",
+    ], []
 
 
-def _scans_turn(recording: Recording, samples: Samples, gyro: NDArray[np.float64]) -> bool:
-    """Whether the scans turn with or against the gyro, which a level plane does in any mount."""
-    if not len(samples.imu_times):
-        return True
-    agreement = _scan_agreement(recording, samples, gyro)
-    return agreement is not None and abs(agreement) >= MIN_CORRELATION
+def _is_level(recording: Recording, imu: _Imu) -> bool:
+    half = max(1, int(0.25 / max(float(np.median(np.diff(imu.times))), 1e-6)))
+    kernel = np.ones(2 * half + 1)
+    smooth = np.column_stack([np.convolve(axis, kernel, "same") for axis in imu.accel.T])
+    return level_share(smooth, _R_imu_lidar(recording)) >= ALWAYS_LEVEL
+
+
+def _scan_agreement(recording: Recording, imu: _Imu, gyro_scale: float) -> float | None:
+    """Correlate the turn of a level 2D lidar from scan to scan with the gyro about its normal."""
+    turns = _scan_turns(recording)
+    if turns is None:
+        return None
+    for batch in recording.batches():
+        if isinstance(batch, LidarBatch):
+            turns.add(batch)
+            if turns.is_full:
+                break
+    rates = gyro_scale * imu.gyro @ _R_imu_lidar(recording)[:, 2]
+    return turns.agreement(imu.times, rates - np.median(rates))
+
+
+def _scan_turns(recording: Recording) -> ScanTurns | None:
+    if recording.lidar_type != LASER_SCAN:
+        return None
+    count = next(t.count for t in recording.topics if t.name == recording.lidar_topic)
+    period = recording.duration / max(1, count - 1)
+    has_beam_times = recording.point_times is not None
+    if has_beam_times and not np.isfinite(period):
+        return None
+    return ScanTurns(period if has_beam_times and period > 0 else None)
+
+
+def _mirrored(recording: Recording) -> str:
+    return (
+        f"{recording.imu_topic}: the gyro turns against the scans of {recording.lidar_topic} about "
+        "the scan plane's normal, so one axis is mirrored; flip the sign of the gyro's axis along "
+        "the normal in the driver, or, if the lidar is mounted upside down, say so in T_imu_lidar"
+    )
 
 
 def _unknown_plane(recording: Recording) -> str:
@@ -187,6 +196,16 @@ def _mount_defects(recording: Recording, *, has_payload: bool) -> list[str]:
     if recording.imu_topic is None or recording.payload.places_lidar_on_imu or not has_payload:
         return []
     return [problems.mount(recording.imu_topic)]
+
+
+def _blind(recording: Recording) -> list[str]:
+    """Look for the first return: a lidar that saw nothing at all was covered or off."""
+    if any(isinstance(batch, LidarBatch) and len(batch.points) for batch in recording.batches()):
+        return []
+    return [
+        f"{recording.lidar_topic}: no valid return at all; check that the lidar was not covered and "
+        "that it was switched on"
+    ]
 
 
 def _R_imu_lidar(recording: Recording) -> NDArray[np.float64]:

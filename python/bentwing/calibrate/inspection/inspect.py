@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""One pass over a recording, and what it lacks for mapping with how to repair it."""
+"""What a recording holds, and what it lacks for mapping with how to repair it."""
 
 from __future__ import annotations
 
@@ -11,18 +11,16 @@ import numpy as np
 
 from bentwing.base.errors import RecordingError
 from bentwing.calibrate.inspection import fitness
-from bentwing.calibrate.inspection.fitness import Samples, Stretch
-from bentwing.calibrate.inspection.planar import ScanTurns
 from bentwing.calibrate.inspection.spin import Spin, spin_from_encoder, spin_from_gyro
 from bentwing.calibrate.inspection.structure import Structure, StructureMeter
 from bentwing.recording.batches import EncoderBatch, ImuBatch
 from bentwing.recording.containers.source import open_source
-from bentwing.recording.messages.lidar_messages import LASER_SCAN
 from bentwing.recording.recording import Recording
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from bentwing.calibrate.inspection.fitness import Stretch
     from bentwing.recording.containers.scanned import TopicInfo
     from bentwing.recording.payload import PayloadLike
 
@@ -126,19 +124,9 @@ def _topic_report(
 
 
 def _inspect_recording(recording: Recording, *, has_payload: bool) -> Inspection:
-    samples, structure = _read(recording)
-    judgement = fitness.judge(recording, samples, has_payload=has_payload)
-    defects, warnings = list(judgement.defects), list(judgement.warnings)
-    if structure.n_points == 0:
-        defects.append(
-            f"{recording.lidar_topic}: no valid return at all; check that the lidar was not "
-            "covered and that it was switched on"
-        )
-    spin = None
-    if len(samples.encoder_times) > 1:
-        spin = spin_from_encoder(samples.encoder_times, samples.encoder_angles)
-    elif len(samples.imu_times) > 1:
-        spin = spin_from_gyro(samples.imu_times, judgement.gyro)
+    judgement = fitness.judge(recording, has_payload=has_payload)
+    spin, structure = _read(recording, judgement.gyro_scale)
+    warnings = list(judgement.warnings)
     if spin is not None:
         warnings += fitness.stall_warnings(spin)
     roles = {
@@ -167,17 +155,16 @@ def _inspect_recording(recording: Recording, *, has_payload: bool) -> Inspection
         judgement.static_start,
         structure,
         dict(recording.counts),
-        defects,
+        judgement.defects,
         recording.warnings + warnings,
     )
 
 
-def _read(recording: Recording) -> tuple[Samples, Structure]:
+def _read(recording: Recording, gyro_scale: float) -> tuple[Spin | None, Structure]:
     """Pass once over the recording, keeping the small streams whole and summing up the lidar's."""
     imu: list[ImuBatch] = []
     encoder: list[EncoderBatch] = []
     meter = StructureMeter()
-    turns = _scan_turns(recording)
     for batch in recording.batches():
         if isinstance(batch, ImuBatch):
             imu.append(batch)
@@ -185,18 +172,13 @@ def _read(recording: Recording) -> tuple[Samples, Structure]:
             encoder.append(batch)
         else:
             meter.add(batch)
-            if turns is not None:
-                turns.add(batch)
-    samples = Samples.joined(imu, encoder, turns)
-    return samples, meter.result(recording.counts["lidar.returns"])
-
-
-def _scan_turns(recording: Recording) -> ScanTurns | None:
-    if recording.lidar_type != LASER_SCAN or recording.encoder_topic is not None:
-        return None
-    count = next(t.count for t in recording.topics if t.name == recording.lidar_topic)
-    period = recording.duration / max(1, count - 1)
-    has_beam_times = recording.point_times is not None
-    if has_beam_times and not np.isfinite(period):
-        return None
-    return ScanTurns(period if has_beam_times and period > 0 else None)
+    structure = meter.result(recording.counts["lidar.returns"])
+    if sum(len(batch.times) for batch in encoder) > 1:
+        times, angles = (
+            np.concatenate([getattr(b, n) for b in encoder]) for n in ("times", "angles")
+        )
+        return spin_from_encoder(times, angles), structure
+    if sum(len(batch.times) for batch in imu) > 1:
+        times, gyro = (np.concatenate([getattr(b, n) for b in imu]) for n in ("times", "gyro"))
+        return spin_from_gyro(times, gyro_scale * gyro), structure
+    return None, structure

@@ -48,10 +48,13 @@ class ScanTurns:
         self._period = period
         self._profiles: dict[float, NDArray[np.float64]] = {}
 
+    @property
+    def is_full(self) -> bool:
+        """Whether more scans would not change the agreement."""
+        return len(self._profiles) >= MAX_SCANS
+
     def add(self, batch: LidarBatch) -> None:
         """Take the next points."""
-        if len(self._profiles) >= MAX_SCANS:
-            return
         azimuths = np.degrees(np.arctan2(batch.points[:, 1], batch.points[:, 0]))
         bins = np.floor(azimuths).astype(np.int64) % N_BEAMS
         ranges = np.hypot(batch.points[:, 0], batch.points[:, 1])

@@ -20,7 +20,7 @@ from bentwing.odometry.interface import Estimator, Snapshot
 from bentwing.odometry.planar import is_plane
 from bentwing.odometry.segments import JUDGED, MAX_IMU_GAP, found_again
 from bentwing.odometry.stall import LOST_AFTER
-from bentwing.recording import LidarBatch
+from bentwing.recording import ImuBatch, LidarBatch
 from bentwing.recording.described import described_mount
 
 if TYPE_CHECKING:
@@ -58,6 +58,7 @@ class Continuous(Estimator):
         self._breaks: list[Break] = []
         # Whether the lidar is a 2D one, which sees single planes when its head stands still.
         self._is_planar = True
+        self._has_imu = False
         self._spin = SpinWatch(by_encoder=payload.encoder is not None)
 
     def take(self, batch: Batch) -> None:
@@ -67,6 +68,7 @@ class Continuous(Estimator):
             return
         if self._is_planar and isinstance(batch, LidarBatch) and len(batch.times) >= 3:
             self._is_planar = is_plane(batch.points)
+        self._has_imu |= isinstance(batch, ImuBatch)
         self._spin.add(batch)
 
     @property
@@ -91,7 +93,9 @@ class Continuous(Estimator):
             return None
         now = phase.under_way.snapshot()
         passes = [*self._before, now]
-        return Snapshot(now, len(passes), partial(self._estimate, passes, [*self._breaks]))
+        return Snapshot(
+            now, len(passes), partial(self._estimate, passes, [*self._breaks], self._first_turn)
+        )
 
     def result(self) -> Estimate:
         """Finish with what was fed so far.
@@ -124,10 +128,19 @@ class Continuous(Estimator):
         if not passes:
             msg = f"less than {shift:g} s of lidar points; nothing can be estimated"
             raise NotEnoughDataError(msg)
-        return self._estimate(passes, self._breaks)
+        return self._estimate(passes, self._breaks, self._first_turn)
 
-    def _estimate(self, passes: list[OdometryPass], breaks: list[Break]) -> Estimate:
-        return estimate_of(passes, self._mount, breaks)
+    @property
+    def _first_turn(self) -> float:
+        """When the head of a 2D lidar had turned once, s; the start if there is no such time."""
+        return (self._spin.first_turn if self._is_planar else None) or 0.0
+
+    def _estimate(
+        self, passes: list[OdometryPass], breaks: list[Break], first_turn: float
+    ) -> Estimate:
+        return estimate_of(
+            passes, self._mount, breaks, first_turn=first_turn, has_imu=self._has_imu
+        )
 
     def _ready_until(self, *, finishing: bool) -> float | None:
         """Return the time up to which lidar and IMU data are complete, s."""

@@ -13,6 +13,7 @@ from bentwing.base.trajectory import DT
 from bentwing.odometry.continuous.odometry_pass import MARGIN
 from bentwing.odometry.continuous.slow_states import named_std
 from bentwing.odometry.core_states import refined_mount
+from bentwing.odometry.health import unseen_sentences
 from bentwing.odometry.segments import joined
 
 if TYPE_CHECKING:
@@ -25,7 +26,12 @@ if TYPE_CHECKING:
 
 
 def estimate_of(
-    passes: Sequence[OdometryPass], described: Mount, breaks: Sequence[Break]
+    passes: Sequence[OdometryPass],
+    described: Mount,
+    breaks: Sequence[Break],
+    *,
+    first_turn: float,
+    has_imu: bool,
 ) -> Estimate:
     """Return what passes that follow each other say, levelled.
 
@@ -34,6 +40,8 @@ def estimate_of(
     passes : at least one; between two of them the recording breaks
     described : the mount as the payload has it
     breaks : that were judged
+    first_turn : s, before which the head of a 2D lidar had not turned once, and saw single planes
+    has_imu : whether there are inertial samples
     """
     segments, last = [p.trajectory() for p in passes], passes[-1]
     windows = [w for p in passes for w in p.windows]
@@ -56,20 +64,24 @@ def estimate_of(
             "estimate.samples_without_imu": n_blind,
         },
         timings={name: sum(p.timings[name] for p in passes) for name in last.timings},
-        health=_health(windows, n_blind),
+        health=_health([w for w in windows if w.time > first_turn], n_blind, has_imu=has_imu),
+        notes=_notes(windows, first_turn),
         breaks=[*breaks],
         segments=[(float(s.times[0]), float(s.times[-1])) for s in segments],
     )
 
 
-def _health(windows: Sequence[WindowRecord], n_blind: int) -> list[str]:
-    sentences = []
-    degenerate = [w.time for w in windows if w.degenerate]
-    if degenerate:
-        sentences.append(
-            f"{len(degenerate)} of {len(windows)} windows see too little in some direction "
-            f"(first at {degenerate[0]:.1f} s): the IMU carries the estimate there"
-        )
+def _notes(windows: Sequence[WindowRecord], first_turn: float) -> list[str]:
+    if not any(w.degenerate and w.time <= first_turn for w in windows):
+        return []
+    return [
+        f"the head had turned once by {first_turn:.1f} s: until then the lidar saw single planes and "
+        "the IMU carried the position, as always at the start"
+    ]
+
+
+def _health(windows: Sequence[WindowRecord], n_blind: int, *, has_imu: bool) -> list[str]:
+    sentences = unseen_sentences(windows, has_imu=has_imu)
     # The trajectory is carried a little beyond the last stamps, always without data.
     if n_blind * DT > 2 * MARGIN:
         sentences.append(

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 # A median above it is a head that turns, rad/s; slower is the carrier's own motion.
 SPINNING = 1.5
+# A median below it is a head at rest with a bias, rad/s.
+_AT_REST = 0.1
 # A head has a usual rate when it has turned for so many bins, 5 s.
 _FEWEST = 20
 
@@ -40,6 +42,10 @@ class SpinWatch:
     Parameters
     ----------
     by_encoder : whether an encoder tells the rate; else the gyro, which turns with the head
+
+    Attributes
+    ----------
+    first_turn : s, when the head had turned once around; None before
     """
 
     def __init__(self, *, by_encoder: bool) -> None:
@@ -50,6 +56,8 @@ class SpinWatch:
         self._moving: list[float] = []
         self._stalls: list[_Bins] = []
         self._turning = False
+        self._turned = 0.0
+        self.first_turn: float | None = None
 
     def add(self, batch: Batch) -> None:
         """Take the next batch; only those of the sensor that tells the rate count."""
@@ -98,6 +106,9 @@ class SpinWatch:
         """Judge a bin that is complete."""
         median = float(np.median(np.concatenate(self._rates)))
         self._rates = []
+        self._turned += BIN * median if median > _AT_REST else 0.0
+        if self.first_turn is None and self._turned >= 2 * np.pi:
+            self.first_turn = (number + 1) * BIN
         if median > SPINNING:
             self._moving.append(median)
         if len(self._moving) < _FEWEST:

@@ -6,7 +6,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from bentwing.base.estimate import Estimate
-from bentwing.odometry.health import FEW
+from bentwing.base.spans import name_spans, spans_of
+from bentwing.odometry.health import FEW, drift, unseen_sentence
 from bentwing.odometry.segments import joined
 
 if TYPE_CHECKING:
@@ -54,18 +55,15 @@ def estimate_of(
 def _health(windows: Sequence[WindowRecord], blind: float) -> list[str]:
     sentences = []
     # The first sweep makes the map.
-    lost = [w.time for w in windows[1:] if not w.registered]
-    if len(lost) > FEW * len(windows):
+    lost = [(w.time, not w.registered and w is not windows[0]) for w in windows]
+    if sum(is_lost for _, is_lost in lost) > FEW * len(windows):
         sentences.append(
-            f"{len(lost)} of {len(windows)} sweeps match too little of what was seen before (first "
-            f"at {lost[0]:.1f} s): the IMU alone carries the estimate there"
+            f"{name_spans(spans_of(lost))} too little is seen of what was seen before: "
+            f"{drift(has_imu=True)}"
         )
     start, stop = _longest_weakness(windows)
     if stop - start > WEAK:
-        sentences.append(
-            f"from {start:.1f} to {stop:.1f} s the sweeps see too little in some direction: the IMU "
-            "carries the estimate there"
-        )
+        sentences.append(unseen_sentence([(start, stop)], has_imu=True))
     if blind > BLIND:
         sentences.append(f"{blind:.2f} s have no inertial data: the motion went on as before there")
     return sentences

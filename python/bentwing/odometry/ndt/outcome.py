@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from bentwing.base.estimate import Estimate
+from bentwing.base.spans import name_spans, spans_of
 from bentwing.base.trajectory import DT, Trajectory
 from bentwing.base.window_record import WindowRecord
-from bentwing.odometry.health import FEW, is_degenerate
+from bentwing.odometry.health import FEW, drift, is_degenerate, unseen_sentence
 from bentwing.odometry.ndt.levelling import SPAN, VELOCITY_SPAN
 from bentwing.odometry.segments import joined
 
@@ -128,18 +129,15 @@ def record_of(time: float, n_surfaces: int, match: Match | None) -> WindowRecord
 def _health(windows: Sequence[WindowRecord]) -> list[str]:
     """Return sentences about what makes the estimate worse than usual."""
     sentences = []
-    lost = [w.time for w in windows if not w.registered]
-    if lost:
+    lost = [(w.time, not w.registered) for w in windows]
+    if any(is_lost for _, is_lost in lost):
         sentences.append(
-            f"{len(lost)} of {len(windows)} scans fit nowhere near where they were expected "
-            f"(first at {lost[0]:.1f} s): the motion went on at constant velocity there"
+            f"{name_spans(spans_of(lost))} the scans fit nowhere near where they were expected: "
+            f"{drift(has_imu=False)}"
         )
-    weak = [w.time for w in windows if w.registered and w.degenerate]
-    if len(weak) > FEW * len(windows):
-        sentences.append(
-            f"{len(weak)} of {len(windows)} scans see too little in some direction (first at "
-            f"{weak[0]:.1f} s): there the trajectory goes on as before, which drifts"
-        )
+    weak = [(w.time, bool(w.registered and w.degenerate)) for w in windows]
+    if sum(is_weak for _, is_weak in weak) > FEW * len(windows):
+        sentences.append(unseen_sentence(spans_of(weak), has_imu=False))
     return sentences
 
 

@@ -21,10 +21,10 @@ from bentwing.run.folder import RunFolder
 from bentwing.run.found import Found
 from bentwing.run.mapping import MapSource, joined_trajectory, write_map
 from bentwing.run.merging.trajectories import write_trajectories
-from bentwing.run.report import report_run
+from bentwing.run.report import report_run, say_warnings
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Collection, Iterator, Mapping, Sequence
 
     from bentwing.base.estimate import Estimate
     from bentwing.base.progress import Progress
@@ -59,6 +59,7 @@ class Ingredients:
     ----------
     matches : of places, all of them
     record : what run.json says about them
+    said : warnings that the user has been told of already
     """
 
     sources: list[Source]
@@ -67,6 +68,7 @@ class Ingredients:
     record: Mapping[str, Any]
     settings: MergeSettings
     progress: Progress
+    said: Collection[str] = ()
 
 
 def make_maps(folder: RunFolder, groups: Sequence[Placed], found: Ingredients) -> list[MergedMap]:
@@ -102,7 +104,7 @@ def _numbers(group: Placed) -> list[int]:
 def _warnings(group: Placed, found: Ingredients) -> list[str]:
     """Return those of the runs in a group, and where a run hangs by one place only."""
     sources, runs = found.sources, _numbers(group)
-    told = [f"{sources[run].name}: {warning}" for run in runs for warning in sources[run].warnings]
+    told = [warning for run in runs for warning in sources[run].told]
     believed = [m for m in found.matches if m.believed and m.a.run != m.b.run]
     for run in runs:
         links = [m for m in believed if run in {m.a.run, m.b.run}]
@@ -131,7 +133,8 @@ def _separate_maps(
         "bentwing did not recognize common places of all runs: they are "
         f"{len(groups)} separate maps, {told}, and their relative poses are unknown"
     )
-    folder.record.found = Found(merging={**found.record, "maps": described}, notes=(note,))
+    folder.record.found = Found(merging={**found.record, "maps": described}, stage_warnings=(note,))
+    say_warnings(found.progress, [note])
     report_run(folder, folder.record.found)
     return maps
 
@@ -185,8 +188,9 @@ def _one_map(
         merging={**found.record, "maps": [described]},
         map=written,
         runs=runs,
-        notes=tuple(notes),
+        stage_warnings=tuple(notes),
     )
+    say_warnings(found.progress, [note for note in notes if note not in found.said])
     report_run(folder, folder.record.found, trajectory)
     return MergedMap(folder.path, [source.name for source in sources], estimates)
 

@@ -24,7 +24,7 @@ from bentwing.run.merging.source import Source, open_sources
 from bentwing.run.settings import merge_settings
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Collection, Mapping, Sequence
 
     from bentwing.run.settings import MergeSettings
 
@@ -95,9 +95,18 @@ def merge(
 
 
 def merge_into(
-    folder: RunFolder, sources: list[Source], settings: MergeSettings, progress: Progress
+    folder: RunFolder,
+    sources: list[Source],
+    settings: MergeSettings,
+    progress: Progress,
+    said: Collection[str] = (),
 ) -> Merged:
-    """Merge opened runs into a folder that is open, too; see `merge`."""
+    """Merge opened runs into a folder that is open, too; see `merge`.
+
+    Parameters
+    ----------
+    said : names of the runs whose warnings the user has been told of already
+    """
     with folder.stage("inputs"):
         folder.add_inputs([path for source in sources for path in source.recordings])
     with folder.stage("survey"):
@@ -122,7 +131,8 @@ def merge_into(
     }
     folder.record.found = Found(merging={**record, "maps": []})
     folder.save()
-    found = Ingredients(sources, surveys, matches, record, settings, progress)
+    told = {warning for source in sources if source.name in said for warning in source.told}
+    found = Ingredients(sources, surveys, matches, record, settings, progress, told)
     return Merged(folder.path, make_maps(folder, groups, found), folder.record.found.merging or {})
 
 

@@ -33,6 +33,7 @@ class Source:
     folder : of the run
     recordings : files that are one recording
     start, duration : s, the part of the recording that was used; None for all of it
+    force : whether the run mapped the recording although it is unfit
     start_ns : time zero of the recording, ns UTC
     inputs : what run.json says about the files
     warnings : of the run
@@ -45,14 +46,20 @@ class Source:
     duration: float | None
     start_ns: int
     payload: Payload
+    force: bool
     estimate: Estimate
     inputs: list[dict[str, Any]]
     warnings: list[str]
 
+    @property
+    def told(self) -> list[str]:
+        """Warnings of the run, as a merged map repeats them."""
+        return [f"{self.name}: {warning}" for warning in self.warnings]
+
     @contextmanager
     def part(self) -> Iterator[RecordingPart]:
         """Open the part of the recording that the run used."""
-        with Recording(self.recordings, self.payload) as recording:
+        with Recording(self.recordings, self.payload, strict=not self.force) as recording:
             yield RecordingPart(recording, self.payload, self.start, self.duration)
 
 
@@ -115,6 +122,7 @@ def open_source(folder: Path, name: str) -> Source:
         settings.get("duration"),
         int(record["start_ns"]),
         _payload(folder, settings),
+        bool(settings.get("force")),
         estimate_of(folder, record),
         record["inputs"],
         list(record.get("warnings") or []),

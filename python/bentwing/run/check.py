@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""What is checked before a run begins: nothing has been estimated or written when it fails."""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from bentwing.base.errors import RecordingError, UsageError
+from bentwing.base.geodesy import ProjectedSystem
+from bentwing.calibrate.inspection import judge
+from bentwing.closing.georeference.control_points import read_control_points
+from bentwing.recording import Recording
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+    from pathlib import Path
+
+    from bentwing.run.settings import RunSettings
+
+
+@contextmanager
+def opened(paths: Path | str | Sequence[Path | str], settings: RunSettings) -> Iterator[Recording]:
+    """Open a recording that can be mapped as the settings say.
+
+    Raises
+    ------
+    RecordingError, PayloadError
+        It cannot be read, does not match the payload, or is unfit for mapping and not forced.
+    UsageError, InputError
+        A setting or a file that it names cannot be used, or has no effect on this recording.
+    """
+    _require_coordinates(settings)
+    with Recording(paths, settings.payload, strict=False) as recording:
+        _require_effect(recording, settings)
+        if not settings.force:
+            _require_fit(recording)
+        yield recording
+
+
+def _require_coordinates(settings: RunSettings) -> None:
+    wanted = settings.georeferencing
+    if wanted.epsg is not None:
+        ProjectedSystem.of_epsg(wanted.epsg)
+    if wanted.control_points is not None:
+        read_control_points(wanted.control_points)
+
+
+def _require_effect(recording: Recording, settings: RunSettings) -> None:
+    """Refuse a wish for coordinates where nothing says where on the Earth the recording is."""
+    wanted = settings.georeferencing
+    if recording.has_fixes or wanted.control_points is not None:
+        return
+    if wanted.epsg is None and wanted.mode != "constraints":
+        return
+    what = f"--epsg {wanted.epsg}" if wanted.epsg is not None else "--georeference constraints"
+    msg = (
+        f"{what} has no effect on {recording.paths[0]}: it has no GNSS fixes that the payload names, "
+        "and there are no control points; name the topic under 'gnss' in payload.yaml, give "
+        "--control-points, or leave the option out"
+    )
+    raise UsageError(msg)
+
+
+def _require_fit(recording: Recording) -> None:
+    """Refuse what `bentwing info` calls unfit."""
+    if defects := judge(recording, has_payload=True).defects:
+        more = f" (`bentwing info` lists {len(defects) - 1} more)" if len(defects) > 1 else ""
+        msg = f"{defects[0]}{more}; to map it all the same, give --force"
+        raise RecordingError(msg)
+    recording.check()

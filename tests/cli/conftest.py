@@ -9,7 +9,7 @@ import pytest
 import yaml
 from rosbags.rosbag1 import Reader, Writer
 
-import bentwing.run.flights
+import bentwing.run.flights  # binds run_recording before a test replaces it
 from bentwing.cli.main import run_command
 
 

@@ -33,6 +33,7 @@ def opened(paths: Path | str | Sequence[Path | str], settings: RunSettings) -> I
     _require_coordinates(settings)
     with Recording(paths, settings.payload, strict=False) as recording:
         _require_effect(recording, settings)
+        _require_part(recording, settings.start)
         if not settings.force:
             _require_fit(recording)
         yield recording
@@ -60,6 +61,15 @@ def _require_effect(recording: Recording, settings: RunSettings) -> None:
         "--control-points, or leave the option out"
     )
     raise UsageError(msg)
+
+
+def _require_part(recording: Recording, start: float | None) -> None:
+    if start is not None and start >= recording.duration:
+        msg = (
+            f"--start {start:g} lies behind the end of {recording.paths[0]}, which lasts "
+            f"{recording.duration:.1f} s"
+        )
+        raise UsageError(msg)
 
 
 def _require_fit(recording: Recording) -> None:

@@ -113,6 +113,7 @@ def no_estimate(monkeypatch):
     ("values", "kind", "part"),
     [
         ({"map_spacing": -1.0}, UsageError, "map_spacing"),
+        ({"start": 500.0}, UsageError, "--start 500 lies behind the end"),
         ({"georeferencing": {"epsg": 4326}}, UsageError, "not projected"),
         ({"georeferencing": {"epsg": 32632}}, UsageError, "--epsg 32632 has no effect"),
         ({"georeferencing": {"mode": "constraints"}}, UsageError, "constraints has no effect"),

@@ -29,10 +29,12 @@ def is_degenerate(translation: Sequence[float], rotation: Sequence[float]) -> bo
     return min(translation[0], rotation[0]) < LEAST_SHARE
 
 
-def unseen_sentences(windows: Sequence[WindowRecord], *, has_imu: bool) -> list[str]:
-    """Say when windows, sweeps or scans leave a direction unseen, if any do."""
-    unseen = [w for w in windows if w.degenerate]
-    spans = spans_of((w.time, w.degenerate) for w in windows)
+def unseen_sentences(
+    windows: Sequence[WindowRecord], *, has_imu: bool, since: float = 0.0
+) -> list[str]:
+    """Say when windows, sweeps or scans leave a direction unseen, if any do that end after `since`, s."""
+    unseen = [w for w in windows if w.degenerate and w.time > since]
+    spans = spans_of((w.time, w.degenerate and w.time > since) for w in windows)
     return [unseen_sentence(spans, has_imu=has_imu, where=_where(unseen))] if unseen else []
 
 

@@ -43,6 +43,13 @@ def test_the_sentence_says_from_when_to_when_and_where(direction, where):
     assert not JARGON.search(sentence)
 
 
+def test_only_what_is_unseen_after_the_start_counts():
+    windows = [window(0.1, [1.0, 0.0, 0.0]), *flight([1.0, 0.0, 0.0])]
+    (sentence,) = unseen_sentences(windows, has_imu=True, since=0.4)
+    assert sentence.startswith("from 31.0 to 33.5 s the surroundings")
+    assert unseen_sentences(windows, has_imu=True, since=40.0) == []
+
+
 def test_a_turn_that_is_not_seen_is_no_direction_of_the_position():
     (sentence,) = unseen_sentences(flight([1.0, 0.0, 0.0], turn=1e-5), has_imu=True)
     assert "structure in some direction" in sentence

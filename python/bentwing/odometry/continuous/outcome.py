@@ -44,6 +44,7 @@ def estimate_of(
     has_imu : whether there are inertial samples
     """
     segments, last = [p.trajectory() for p in passes], passes[-1]
+    gap = last.settings.registration.min_match_gap
     windows = [w for p in passes for w in p.windows]
     n_blind = sum(p.n_blind for p in passes)
     slow = last.globals
@@ -64,11 +65,20 @@ def estimate_of(
             "estimate.samples_without_imu": n_blind,
         },
         timings={name: sum(p.timings[name] for p in passes) for name in last.timings},
-        health=_health([w for w in windows if w.time > first_turn], n_blind, has_imu=has_imu),
+        health=_health(windows, n_blind, since=_since(windows, first_turn, gap), has_imu=has_imu),
         notes=_notes(windows, first_turn),
         breaks=[*breaks],
         segments=[(float(s.times[0]), float(s.times[-1])) for s in segments],
     )
+
+
+def _since(windows: Sequence[WindowRecord], first_turn: float, gap: float) -> float:
+    """Return from when on a direction unseen says something about the surroundings, s.
+
+    Until the head has turned, and until surfaces are old enough to be matched with newer ones, there
+    is little to match anywhere.
+    """
+    return max(first_turn, windows[0].time + gap) if windows else first_turn
 
 
 def _notes(windows: Sequence[WindowRecord], first_turn: float) -> list[str]:
@@ -80,8 +90,10 @@ def _notes(windows: Sequence[WindowRecord], first_turn: float) -> list[str]:
     ]
 
 
-def _health(windows: Sequence[WindowRecord], n_blind: int, *, has_imu: bool) -> list[str]:
-    sentences = unseen_sentences(windows, has_imu=has_imu)
+def _health(
+    windows: Sequence[WindowRecord], n_blind: int, *, since: float, has_imu: bool
+) -> list[str]:
+    sentences = unseen_sentences(windows, since=since, has_imu=has_imu)
     # The trajectory is carried a little beyond the last stamps, always without data.
     if n_blind * DT > 2 * MARGIN:
         sentences.append(

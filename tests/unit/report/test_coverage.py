@@ -74,7 +74,7 @@ def test_degenerate_windows_become_stretches():
     spans = degenerate_spans(windows([False, True, True, False, True]))
     assert spans == [(1.0, 3.0), (4.0, 5.0)]
     assert "for 3 s" in spans_sentence(spans)
-    assert "1 to 3 s" in spans_sentence(spans)
+    assert "from 1.0 to 3.0 s" in spans_sentence(spans)
     assert "all the time" in spans_sentence(degenerate_spans(windows([False])))
 
 

@@ -73,7 +73,9 @@ def judge(recording: Recording, *, has_payload: bool) -> Judgement:
     can_be_level &= recording.encoder_topic is None
     seconds = np.inf if can_be_level else imu_units.CHECKED
     imu = _Imu(*imu_units.collect(recording.imu_batches(), seconds))
+    # The mount comes first: what follows takes the frames as it says.
     defects = _time_defects(recording) + recording.clock_problems()
+    defects += _mount_defects(recording, has_payload=has_payload)
     warnings: list[str] = []
     static, scale = None, 1.0
     if len(imu.times):
@@ -88,7 +90,7 @@ def judge(recording: Recording, *, has_payload: bool) -> Judgement:
     if can_be_level:
         found, unknown = _planar(recording, imu, scale, has_payload=has_payload)
         defects, warnings = defects + found, warnings + unknown
-    defects += _mount_defects(recording, has_payload=has_payload) + _blind(recording)
+    defects += _blind(recording)
     return Judgement(defects, warnings, static, scale)
 
 

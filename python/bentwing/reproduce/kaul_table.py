@@ -35,7 +35,7 @@ def flight_rows(flown: Flown, measured: Measured) -> list[Compared]:
     slow, fast = np.percentile(measured.speeds, [10, 90])
     minutes = flown.duration / 60
     total = flown.record["timings"]["total"]
-    spin = np.degrees(np.array(flown.found.spin.rates))
+    spin = np.degrees([rate for _, rate in flown.found.spin.samples])
     spun = spin[spin > 60.0]
     return [
         Compared(

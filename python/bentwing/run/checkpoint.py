@@ -68,7 +68,7 @@ class Checkpoint:
         np.savez(
             data,
             described=np.array(json.dumps(plain(described))),
-            spin=np.array([found.spin.times, found.spin.rates]),
+            spin=np.array(found.spin.samples).reshape(-1, 2),
             **arrays,
         )
         write_bytes(self._folder.file(NAME), data.getvalue())
@@ -144,7 +144,7 @@ def _found(arrays: dict[str, Any], described: dict[str, Any]) -> Found:
     return Found(
         Estimate(trajectory, Calibration.from_json(described["calibration"]), **fields),
         Reading(**described["reading"]),
-        Spin(*arrays["spin"].tolist()),
+        Spin([(time, rate) for time, rate in arrays["spin"].tolist()]),
         **described["corrections"],
         stage_warnings=tuple(described["stage_warnings"]),
     )

@@ -40,22 +40,23 @@ class Spin:
 
     Attributes
     ----------
-    times, rates : s and rad/s
+    samples : time, s, and rate, rad/s
     """
 
-    times: list[float] = field(default_factory=list)
-    rates: list[float] = field(default_factory=list)
+    samples: list[tuple[float, float]] = field(default_factory=list)
 
     def watch(self, batch: Batch) -> None:
         """Note the rate of turn of an IMU batch."""
         if isinstance(batch, ImuBatch) and len(batch.times):
-            self.times.append(float(batch.times.mean()))
-            self.rates.append(float(np.median(np.linalg.norm(batch.gyro, axis=1))))
+            rate = float(np.median(np.linalg.norm(batch.gyro, axis=1)))
+            # both at once: an interrupt may come between any two statements
+            self.samples.append((float(batch.times.mean()), rate))
 
     @property
     def series(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
         """Times (N,) s and rates (N,) rad/s; None without an IMU."""
-        return (np.array(self.times), np.array(self.rates)) if self.times else None
+        times, rates = np.array(self.samples).reshape(-1, 2).T
+        return (times, rates) if len(times) else None
 
 
 @dataclass(frozen=True, slots=True)

@@ -67,8 +67,10 @@ def estimate(job: Job, found: Found, engine: Estimator) -> Found:
             open_loop = engine.result()
     except BaseException as error:
         failure = error
+        # There may be nothing yet, and an interrupt may find a step half done.
+        lacking = Exception if isinstance(error, KeyboardInterrupt) else EstimationError
         if isinstance(error, (EstimationError, KeyboardInterrupt)):
-            with suppress(EstimationError):  # there may be nothing yet
+            with suppress(lacking):
                 open_loop = engine.so_far()
     reading = Reading(dict(part.recording.counts + counts), list(part.recording.warnings))
     return replace(found, estimate=open_loop, reading=reading, spin=spin, failure=failure)

@@ -23,6 +23,7 @@ from bentwing.map.sample import MapSample
 from bentwing.recording import Clock, ImuBatch, LidarBatch, Payload
 from bentwing.recording.described import described_mount
 from bentwing.run import check, pipeline
+from bentwing.run.found import Spin
 from bentwing.run.run import Run
 from bentwing.run.settings import RunSettings, run_settings
 
@@ -168,6 +169,34 @@ def test_a_failed_estimate_keeps_the_odometry_and_explains_itself(tmp_path, reco
     assert record["files"] == ["odometry.txt", "report.html"]
     assert read_tum(out / "odometry.txt")[0].times[-1] == pytest.approx(5.0, abs=0.2)
     assert "Incomplete" in (out / "report.html").read_text()
+
+
+def test_an_interrupt_between_two_statements_leaves_no_half_sample_of_the_spin(monkeypatch):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    spin, batch = Spin(), ImuBatch(np.arange(3.0), np.ones((3, 3)), np.zeros((3, 3)))
+    monkeypatch.setattr(np, "median", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        spin.watch(batch)
+    assert spin.series is None
+    monkeypatch.undo()
+    spin.watch(batch)
+    assert [len(values) for values in spin.series] == [1, 1]
+
+
+def test_an_interrupt_in_the_middle_of_a_step_is_an_interrupt(tmp_path, recording, monkeypatch):
+    def half_done(*_):
+        raise ValueError("times must increase")
+
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(FakeEstimator, "so_far", half_done)
+    monkeypatch.setattr(FakeEstimator, "feed", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        pipeline.map_recording(recording, PAYLOAD, tmp_path / "out")
+    assert record_of(tmp_path / "out")["reason"] == "interrupted"
 
 
 def test_an_interrupt_while_mapping_leaves_the_trajectory_and_no_half_map(

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,12 +10,11 @@ import pytest
 
 from bentwing import Odometry
 from bentwing.base.trajectory import read_tum
-from bentwing.odometry import Continuous
 from bentwing.odometry.continuous.settings import ContinuousSettings
 from bentwing.recording import EncoderBatch, ImuBatch, LidarBatch, Payload, Recording
 from bentwing.recording.payload import Encoder, Transform
-from bentwing.recording.preprocess import preprocess
 from bentwing.simulate import Scenario, simulate
+from support.live import offline
 
 LENGTH = 12.0  # s; the rest at the start is over after four
 THINNING = 3  # every third point, for speed
@@ -57,12 +55,9 @@ def part(batch, rows):
     return EncoderBatch(batch.times[rows], batch.angles[rows])
 
 
-def offline(flight, settings=QUICK):
-    """What the estimator says of a flight."""
-    engine = Continuous(flight.payload, settings, 1)
-    for batch in preprocess(flight.batches, flight.payload, Counter()):
-        engine.feed(batch)
-    return engine.result()
+def estimated(flight, settings=QUICK):
+    """What the continuous estimator says of a flight."""
+    return offline(flight, "continuous", settings)
 
 
 def bytes_of(estimate):
@@ -80,7 +75,7 @@ def read_flight_fixture():
 @pytest.fixture(scope="session", name="offline")
 def offline_fixture():
     """Return the offline estimate of a flight."""
-    return offline
+    return estimated
 
 
 @pytest.fixture(scope="session")
@@ -119,7 +114,7 @@ def turned_payload(flight):
 @pytest.fixture(scope="session")
 def estimate(flight):
     """What the estimator says of it when all of it is there."""
-    return offline(flight)
+    return estimated(flight)
 
 
 @pytest.fixture

@@ -3,50 +3,27 @@
 
 from __future__ import annotations
 
-from collections import Counter
-
 import numpy as np
 import pytest
 
 from bentwing import Odometry
-from bentwing.odometry import Kalman
 from bentwing.odometry.kalman import KalmanSettings
-from bentwing.recording import ImuBatch
-from bentwing.recording.preprocess import preprocess
+from support.live import fly, offline
 
 SETTINGS = KalmanSettings(rehearsal=4.0)
 
 
 @pytest.fixture(scope="module")
-def offline(turning):
-    engine = Kalman(turning.payload, SETTINGS)
-    for batch in preprocess(turning.batches, turning.payload, Counter()):
-        engine.feed(batch)
-    return engine.result()
-
-
-@pytest.fixture(scope="module")
 def flown(turning):
-    """An odometry that was fed in pieces, what it said meanwhile, and its result."""
-    said = []
-    with Odometry(turning.payload, estimator="kalman", settings=SETTINGS) as odometry:
-        for i, piece in enumerate(turning.pieces):
-            odometry.feed(piece)
-            if isinstance(piece, ImuBatch) and i % 10 == 0:
-                assert odometry.wait(60.0)
-                if odometry.status != "waiting":
-                    said.append((odometry.pose(), odometry.status))
-        cloud = odometry.map_points()
-        final = odometry.finish()
-    return said, cloud, final
+    return fly(turning, "kalman", SETTINGS)
 
 
-def test_a_replay_in_pieces_gives_the_bytes_of_the_offline_estimate(flown, offline, all_bytes):
-    assert all_bytes(flown[2]) == all_bytes(offline)
+def test_a_replay_in_pieces_gives_the_bytes_of_the_offline_estimate(flown, turning, all_bytes):
+    assert all_bytes(flown.final) == all_bytes(offline(turning, "kalman", SETTINGS))
 
 
 def test_poses_are_young_and_near_the_final_ones(flown):
-    said, _, final = flown
+    said, final = flown.said, flown.final
     times = np.array([pose.time for pose, _ in said])
     inside = (times > 6.0) & (times <= final.trajectory.times[-1])
     assert inside.sum() > 20
@@ -58,7 +35,7 @@ def test_poses_are_young_and_near_the_final_ones(flown):
 
 
 def test_the_map_has_points_of_the_room(flown):
-    _, cloud, _ = flown
+    cloud = flown.cloud
     assert len(cloud) > 5000
     assert np.abs(cloud).max() < 30.0
 

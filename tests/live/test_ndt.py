@@ -3,17 +3,16 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from bentwing import Odometry
-from bentwing.odometry import Ndt
 from bentwing.odometry.ndt import NdtSettings
-from bentwing.recording import ImuBatch, LidarBatch
-from bentwing.recording.preprocess import preprocess
+from bentwing.recording import LidarBatch
+from support.live import fly, offline
 
 SETTINGS = NdtSettings(max_points=1000)
 LENGTH = 9.0
@@ -25,40 +24,24 @@ def fixed(simulated, read_flight):
     return read_flight(simulated("office", 22.0, head="vlp16-fixed"), LENGTH, 3)
 
 
-def offline(flight, payload=None):
-    payload = payload or flight.payload
-    engine = Ndt(payload, SETTINGS)
-    for batch in preprocess(flight.batches, payload, Counter()):
-        engine.feed(batch)
-    return engine.result()
+def estimate(flight, payload=None):
+    return offline(flight, "ndt", SETTINGS, payload)
 
 
 @pytest.fixture(scope="module")
 def flown(fixed):
-    """An odometry that was fed in pieces, what it said meanwhile, and its result."""
-    said = []
-    with Odometry(fixed.payload, estimator="ndt", settings=SETTINGS) as odometry:
-        for i, piece in enumerate(fixed.pieces):
-            odometry.feed(piece)
-            if isinstance(piece, ImuBatch) and i % 10 == 0:
-                assert odometry.wait(60.0)
-                if odometry.status != "waiting":
-                    said.append((odometry.pose(), odometry.status))
-        cloud = odometry.map_points()
-        halfway = odometry.estimate()
-        final = odometry.finish()
-    return said, cloud, halfway, final
+    return fly(fixed, "ndt", SETTINGS)
 
 
 def test_a_replay_in_pieces_gives_the_bytes_of_the_offline_estimate(flown, fixed, all_bytes):
-    assert all_bytes(flown[3]) == all_bytes(offline(fixed))
+    assert all_bytes(flown.final) == all_bytes(estimate(fixed))
 
 
 def test_a_motor_turned_lidar_gives_the_same_bytes(turning, all_bytes):
     with Odometry(turning.payload, estimator="ndt", settings=SETTINGS) as odometry:
         for batch in turning.batches:
             odometry.feed(batch)
-        assert all_bytes(odometry.finish()) == all_bytes(offline(turning))
+        assert all_bytes(odometry.finish()) == all_bytes(estimate(turning))
 
 
 def test_poses_are_young_and_near_the_final_ones(flown):
@@ -66,7 +49,7 @@ def test_poses_are_young_and_near_the_final_ones(flown):
 
     Scans are known to a centimetre or two, and a velocity from three of them to 10 cm/s.
     """
-    said, *_, final = flown
+    said, final = flown.said, flown.final
     times = np.array([pose.time for pose, _ in said])
     assert max(pose.predicted for pose, _ in said) < 0.25
     inside = (times > 2.0) & (times <= final.trajectory.times[-1])
@@ -78,20 +61,20 @@ def test_poses_are_young_and_near_the_final_ones(flown):
 
 
 def test_the_vertical_is_learned_in_the_first_ten_seconds(flown):
-    said, *_ = flown
+    said = flown.said
     assert said[0][0].time < 1.0
     assert {status for _, status in said} == {"initializing"}
 
 
 def test_the_map_has_points_of_the_room(flown):
-    _, cloud, *_ = flown
+    cloud = flown.cloud
     assert len(cloud) > 3000
     assert np.abs(cloud).max() < 30.0
 
 
 def test_what_is_known_on_the_way_is_the_beginning_of_the_result(flown):
     """But for the last scans, which go on straight until the next one comes."""
-    *_, halfway, final = flown
+    halfway, final = flown.halfway, flown.final
     positions, _ = final.trajectory.interpolate(halfway.trajectory.times[:-50])
     assert np.abs(halfway.trajectory.positions[:-50] - positions).max() < 0.01
 
@@ -131,7 +114,5 @@ def test_a_lidar_alone_is_followed_and_predicted_at_constant_velocity(fixed, all
     assert "tracking" in statuses
     assert "initializing" not in statuses
     lidar = [b for b in fixed.batches if isinstance(b, LidarBatch)]
-    engine = Ndt(payload, SETTINGS)
-    for batch in preprocess(lidar, payload, Counter()):
-        engine.feed(batch)
-    assert all_bytes(final) == all_bytes(engine.result())
+    alone = SimpleNamespace(payload=payload, batches=lidar)
+    assert all_bytes(final) == all_bytes(estimate(alone))

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import fields
+from typing import Any
 
 import numpy as np
 
@@ -17,13 +18,12 @@ class Value:
     __slots__ = ()
     # Else an array on the other side of == would take the value for a sequence.
     __array_ufunc__ = None
-    __hash__ = None  # type: ignore[assignment] # arrays have none either
 
     def __eq__(self, other: object) -> bool:
         if type(other) is not type(self):
             return NotImplemented
-        # A dataclass each: the subclass is one, which the type of this base cannot say.
-        names = [field.name for field in fields(self) if field.compare]  # type: ignore[arg-type]
+        value: Any = self  # a dataclass, which the type of this base cannot say
+        names = [field.name for field in fields(value) if field.compare]
         return all(_are_equal(getattr(self, name), getattr(other, name)) for name in names)
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from typer.core import TyperCommand
 
+from bentwing.cli.mistakes import Mistake
 from bentwing.cli.options import GROUPS
 
 if TYPE_CHECKING:
@@ -43,7 +44,7 @@ class Command(TyperCommand):
                 parameter.required = False
         try:
             return super().parse_args(ctx, args)
-        except Exception as error:
+        except Mistake as error:
             # The parser does not say of every mistake in which command it was made.
             mistake: Any = error
             if getattr(error, "ctx", ctx) is None:

@@ -13,16 +13,11 @@ import typer
 from bentwing.base.errors import BentwingError, UsageError
 from bentwing.cli.command import CONTEXT, closing
 from bentwing.cli.commands import LazyCommands
-from bentwing.cli.mistakes import explain
+from bentwing.cli.mistakes import Mistake, explain
 
 INTERRUPTED = 130
 _UNEXPECTED = 70  # EX_SOFTWARE of sysexits.h
 _DEBUG = "BENTWING_DEBUG"
-
-# typer hides the click it carries; the base of its errors is found through the one class it shows.
-_CommandLineError: type[Exception] = next(
-    base for base in typer.BadParameter.__mro__ if base.__name__ == "ClickException"
-)
 
 _EXAMPLES = (
     "bentwing simulate courtyard -o recording --duration 30",
@@ -79,7 +74,7 @@ def run_command(arguments: list[str]) -> int:
         result = app(arguments, prog_name="bentwing", standalone_mode=False)
     except BentwingError as error:
         return _fail(str(error), error.exit_code)
-    except _CommandLineError as error:
+    except Mistake as error:
         return _fail(explain(error), UsageError.exit_code)
     except (KeyboardInterrupt, typer.Abort):
         return _fail("interrupted", INTERRUPTED)

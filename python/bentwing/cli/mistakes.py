@@ -7,8 +7,16 @@ import re
 from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any
 
+import typer
+
 if TYPE_CHECKING:
     from collections.abc import Iterable
+
+
+# typer hides the click it carries; the base of its errors is found through the one class it shows.
+Mistake: type[Exception] = next(
+    base for base in typer.BadParameter.__mro__ if base.__name__ == "ClickException"
+)
 
 
 def did_you_mean(given: str, known: Iterable[str]) -> str:

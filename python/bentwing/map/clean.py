@@ -7,9 +7,10 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from bentwing import _core
+from bentwing.base.settings import Settings
 from bentwing.map.spool import ChunkSpool
 
 if TYPE_CHECKING:
@@ -30,10 +31,8 @@ MAX_RAYS = 4_000_000  # 32 bytes each
 MARGIN = 2 * EDGE
 
 
-class CleanSettings(BaseModel):
+class CleanSettings(Settings):
     """What is left out of the map."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     mixed_pixels: bool = Field(
         default=True,

@@ -116,12 +116,8 @@ class Found:
     @property
     def warnings(self) -> list[str]:
         """Sentences about the health of the result, each once."""
-        sentences = [*self.reading.warnings, *self.stage_warnings]
-        if self.estimate is not None:
-            sentences[len(self.reading.warnings) : len(self.reading.warnings)] = (
-                self.estimate.warnings
-            )
-        return list(dict.fromkeys(sentences))
+        estimated = [] if self.estimate is None else self.estimate.warnings
+        return list(dict.fromkeys([*self.reading.warnings, *estimated, *self.stage_warnings]))
 
     @property
     def timings(self) -> dict[str, float]:

@@ -7,10 +7,11 @@ from pathlib import Path  # noqa: TC003 - pydantic reads the annotations
 from typing import Annotated, Any, Literal, TypeVar
 
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+from pydantic import BaseModel, Field, ValidationError, field_validator
 
 from bentwing.base.errors import BentwingError, UsageError
 from bentwing.base.plain import plain
+from bentwing.base.settings import Settings
 from bentwing.base.units import Metres, Unit
 from bentwing.base.validation import describe
 from bentwing.closing.georeference.settings import GeoreferenceSettings
@@ -31,10 +32,8 @@ from bentwing.recording import Payload
 _Model = TypeVar("_Model", bound=BaseModel)
 
 
-class MapSettings(BaseModel):
+class MapSettings(Settings):
     """How a map is written, of one run or of several."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     map_format: MapFormat = Field(default="laz", description="file format of the map")
     map_spacing: Metres = Field(

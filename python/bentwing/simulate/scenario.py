@@ -6,8 +6,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
+from bentwing.base.settings import Settings
 from bentwing.simulate.events import STALL, strong_bias
 from bentwing.simulate.imu import PERFECT, ImuErrors
 from bentwing.simulate.names import (  # noqa: TC001 - pydantic reads the annotations
@@ -24,7 +25,7 @@ from bentwing.simulate.ranging import RangeErrors
 _SURVEYED = ("walls", "dam")
 
 
-class Scenario(BaseModel):
+class Scenario(Settings):
     """What to simulate.
 
     Attributes
@@ -49,8 +50,6 @@ class Scenario(BaseModel):
     calibrated : whether the payload has the head as it is, and the clocks agree
     noiseless : without random errors of the sensors (calibration and clock stay wrong)
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     scene: SceneName
     head: HeadName = "hokuyo-spin"

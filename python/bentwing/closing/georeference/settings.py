@@ -5,17 +5,16 @@ from __future__ import annotations
 
 from pathlib import Path  # noqa: TC003 - pydantic reads the annotations
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
+from bentwing.base.settings import Settings
 from bentwing.closing.georeference.names import (
     GeoreferenceMode,  # noqa: TC001 - pydantic reads the annotations
 )
 
 
-class GeoreferenceSettings(BaseModel):
+class GeoreferenceSettings(Settings):
     """How GNSS fixes and control points are used."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     mode: GeoreferenceMode = Field(
         default="rigid",

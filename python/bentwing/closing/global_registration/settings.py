@@ -5,16 +5,15 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
+from bentwing.base.settings import Settings
 from bentwing.base.units import Metres, Radians, Seconds, Unit
 from bentwing.odometry.continuous.settings import RegistrationSettings, SurfelSettings
 
 
-class GlobalSettings(BaseModel):
+class GlobalSettings(Settings):
     """How a recording is closed with itself (Kaul 2015, section 2.2)."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     knot_interval: Seconds = Field(
         default=1.0,

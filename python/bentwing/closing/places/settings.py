@@ -3,15 +3,14 @@
 
 from __future__ import annotations
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
+from bentwing.base.settings import Settings
 from bentwing.base.units import Metres, Seconds  # noqa: TC001 - pydantic reads them
 
 
-class PlaceSettings(BaseModel):
+class PlaceSettings(Settings):
     """How places are made and described."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     duration: Seconds = Field(
         default=10.0,
@@ -34,10 +33,8 @@ class PlaceSettings(BaseModel):
     n_keypoints: int = Field(default=400, ge=1, description="number of keypoints of a place")
 
 
-class MatchSettings(BaseModel):
+class MatchSettings(Settings):
     """What it takes to believe that two places overlap."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     n_neighbours: int = Field(
         default=5, ge=1, description="number of a descriptor's neighbours that vote"

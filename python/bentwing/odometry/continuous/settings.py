@@ -5,17 +5,14 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator
+from pydantic import Field, field_validator
 
+from bentwing.base.settings import Settings
 from bentwing.base.units import Metres, Radians, Seconds, Unit
 from bentwing.odometry.continuous.slow_states import SLICES
 
 
-class _Section(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
-
-class SurfelSettings(_Section):
+class SurfelSettings(Settings):
     """What makes a surfel (Kaul 2015, section 2.1)."""
 
     voxel_size: Metres = Field(
@@ -49,7 +46,7 @@ class SurfelSettings(_Section):
     )
 
 
-class RegistrationSettings(_Section):
+class RegistrationSettings(Settings):
     """How a window is registered (Kaul 2015, section 2.1)."""
 
     knot_interval: Seconds = Field(
@@ -96,7 +93,7 @@ class RegistrationSettings(_Section):
     )
 
 
-class ContinuousSettings(_Section):
+class ContinuousSettings(Settings):
     """The sliding window of the continuous estimator."""
 
     window: Seconds = Field(default=5.0, gt=0, description="length of the sliding window")

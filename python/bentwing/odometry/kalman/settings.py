@@ -5,15 +5,14 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
+from bentwing.base.settings import Settings
 from bentwing.base.units import Metres, Seconds, Unit
 
 
-class KalmanSettings(BaseModel):
+class KalmanSettings(Settings):
     """The error-state iterated Kalman filter (Fu 2023, section 2.3)."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     scan: Seconds = Field(
         default=0.1, ge=0.02, le=1.0, description="length of the lidar data per update"

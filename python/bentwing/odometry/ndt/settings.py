@@ -5,15 +5,14 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
+from bentwing.base.settings import Settings
 from bentwing.base.units import Metres, Radians, Seconds  # noqa: TC001 - pydantic reads them
 
 
-class NdtSettings(BaseModel):
+class NdtSettings(Settings):
     """NDT odometry against keyframes (Tazir 2020, algorithm 1)."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     scan: Seconds = Field(
         default=0.1, ge=0.02, le=1.0, description="length of a scan: one revolution of the lidar"

@@ -268,6 +268,17 @@ def test_an_imu_without_its_place(refuse, office, changed_payload):
     )
 
 
+def test_a_mount_that_lays_the_scan_plane_level_is_doubted(refuse, office, changed_payload):
+    # A quarter turn off: the head spins an upright plane, and the payload says it is level.
+    level = {"quaternion": [0.0, 0.0, 0.0, 1.0]}
+    refuse(
+        office / "recording.bag",
+        "stays level",
+        "correct T_imu_lidar",
+        payload=changed_payload(T_imu_lidar=level),
+    )
+
+
 def test_clocks_that_have_nothing_to_do_with_each_other(refuse, changed_bag, shifted):
     def other_clock(topic, t, message):
         return [(t, shifted(message, 3600.0) if topic == "/imu" else message)]

@@ -140,10 +140,13 @@ def _planar(
     if not has_payload and not turns:
         return [], [_unknown_plane(recording)]
     defects = [] if agreement is None or agreement > -MIN_CORRELATION else [_mirrored(recording)]
+    doubt = ""
+    if recording.payload.places_lidar_on_imu and not turns:
+        doubt = "correct T_imu_lidar if the lidar is mounted otherwise, "
     return [
         *defects,
         f"{recording.lidar_topic}: a 2D lidar whose scan plane stays level sees one slice of the "
-        "surroundings and cannot make a 3D map; spin or nod the lidar, or use a 2D SLAM program",
+        f"surroundings and cannot make a 3D map; {doubt}spin or nod the lidar, or use a 2D SLAM program",
     ], []
 
 

@@ -123,7 +123,7 @@ class Messages:
     def joint(self, t, angle, *, names=("motor",)):
         empty = np.zeros(0)
         return self.types["sensor_msgs/msg/JointState"](
-            self.header(t), list(names), np.array([angle], float), empty, empty
+            self.header(t), list(names), np.atleast_1d(np.array(angle, float)), empty, empty
         )
 
     def cloud(self, t, table: np.ndarray, *, row_step=None, data=None, height=1, frame="lidar"):

@@ -14,7 +14,7 @@ from benches.peers.feed import Head, Imu, open_feed, write_feed
 from benches.support.cost import Cost, Finished, python
 from bentwing.base import geometry
 from bentwing.base.trajectory import Trajectory
-from bentwing.recording.payload import Encoder
+from bentwing.recording import Encoder
 
 
 def circling(times):

@@ -14,8 +14,7 @@ from bentwing.base import geometry
 from bentwing.base.errors import EstimationError, NotEnoughDataError, PayloadError, UsageError
 from bentwing.base.mount import Pose
 from bentwing.base.window_record import WindowRecord
-from bentwing.recording import ImuBatch, LidarBatch
-from bentwing.recording.payload import Encoder, Transform
+from bentwing.recording import Encoder, ImuBatch, LidarBatch, Transform
 
 
 def all_bytes(estimate):

@@ -11,8 +11,15 @@ import pytest
 from bentwing import Odometry
 from bentwing.base.trajectory import read_tum
 from bentwing.odometry.continuous.settings import ContinuousSettings
-from bentwing.recording import EncoderBatch, ImuBatch, LidarBatch, Payload, Recording
-from bentwing.recording.payload import Encoder, Transform
+from bentwing.recording import (
+    Encoder,
+    EncoderBatch,
+    ImuBatch,
+    LidarBatch,
+    Payload,
+    Recording,
+    Transform,
+)
 from bentwing.simulate import Scenario, simulate
 from support.live import offline
 

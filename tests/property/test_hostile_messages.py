@@ -18,6 +18,7 @@ from bentwing.recording.messages import wire_clouds
 from bentwing.recording.messages.lidar_messages import LIDAR_MESSAGES
 from bentwing.recording.messages.point_cloud2 import columns
 from bentwing.recording.point_times import TimeReading
+from bentwing.recording.readings import EncoderReading, ImuReading, LidarReading
 from bentwing.recording.streams import EncoderStream, ImuStream
 
 CLOCK = Clock(1_700_000_000 * 10**9)
@@ -62,7 +63,7 @@ def test_any_field_layout_is_read(ros, table):
 
 def lidar_stream(kind, *, cdr):
     return LidarStream(
-        "/lidar", kind, CLOCK, cdr=cdr, use_recorder_time=False, reading=READING,
+        "/lidar", kind, CLOCK, LidarReading(), cdr=cdr, use_recorder_time=False, times=READING,
         needs_beam_times=False,
     )  # fmt: skip
 
@@ -71,8 +72,10 @@ def streams_and_messages(ros):
     cdr = not ros.ros1
     table = np.zeros(5, [("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("time", "<f4"), ("ring", "u1")])
     table["x"], table["time"] = np.arange(1, 6), np.linspace(0, 0.1, 5)
-    imu = ImuStream("/imu", CLOCK, cdr=cdr, use_recorder_time=False)
-    encoder = EncoderStream("/encoder", CLOCK, cdr=cdr, use_recorder_time=False)
+    imu = ImuStream("/imu", CLOCK, ImuReading(), cdr=cdr, use_recorder_time=False)
+    encoder = EncoderStream(
+        "/encoder", CLOCK, EncoderReading("motor"), cdr=cdr, use_recorder_time=False
+    )
     lidars = [
         ros.cloud(0.25, table),
         ros.scan(0.25, [1, 2, 3]),

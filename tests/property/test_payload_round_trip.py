@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
 from __future__ import annotations
 
+from typing import get_args
+
 import numpy as np
 import yaml
 from hypothesis import HealthCheck, given, settings
@@ -8,6 +10,7 @@ from hypothesis import strategies as st
 
 from bentwing.base.errors import PayloadError
 from bentwing.recording.payload import Payload
+from bentwing.recording.sections.imu import AccelUnit, GyroUnit
 
 length = st.floats(-5, 5)
 vector = st.tuples(length, length, length)
@@ -22,20 +25,53 @@ box = st.tuples(vector, st.tuples(*[st.floats(0.1, 5)] * 3)).map(
     lambda pair: {"min": pair[0], "max": tuple(np.add(*pair).tolist())}
 )
 topic = st.text(min_size=1, max_size=20)
+axes = st.permutations("xyz").flatmap(
+    lambda order: st.tuples(*[st.sampled_from([axis, f"-{axis}"]) for axis in order])
+)
 payloads = st.fixed_dictionaries(
     {},
     optional={
         "name": st.text(max_size=20),
         "lidar": st.fixed_dictionaries(
             {"kind": st.sampled_from(["hokuyo-utm30lx", "vlp16", "ouster", "livox", "hesai"])},
-            optional={"topic": topic, "range_sigma": positive, "latency": st.floats(-0.1, 0.1)},
+            optional={
+                "topic": topic,
+                "range_sigma": positive,
+                "latency": st.floats(-1.5, 1.5),
+                "mirrored": st.booleans(),
+                "range_scale": positive,
+            },
         ),
-        "imu": st.none() | st.fixed_dictionaries({}, optional={"gyro_noise": positive}),
+        "imu": st.none()
+        | st.fixed_dictionaries(
+            {},
+            optional={
+                "gyro_noise": positive,
+                "axes": axes,
+                "gyro_axes": axes,
+                "units": st.fixed_dictionaries(
+                    {},
+                    optional={
+                        "accel": st.sampled_from(get_args(AccelUnit)),
+                        "gyro": st.sampled_from(get_args(GyroUnit)),
+                    },
+                ),
+                "clock_offset": st.floats(-4e9, 4e9),
+            },
+        ),
         "T_imu_lidar": st.none() | transform,
         "self_hits": st.lists(st.fixed_dictionaries({"box": box}), max_size=3),
         "encoder": st.none()
         | st.fixed_dictionaries(
-            {}, optional={"T_imu_motor": transform, "delay": st.floats(-0.1, 0.1)}
+            {},
+            optional={
+                "T_imu_motor": transform,
+                "delay": st.floats(-1.5, 1.5),
+                "joint": topic,
+                "unit": st.sampled_from(["rad", "deg"]),
+                "sign": st.sampled_from([1, -1]),
+                "clock_offset": st.floats(-4e9, 4e9),
+            },
         ),
         "calibration": st.none()
         | st.fixed_dictionaries(

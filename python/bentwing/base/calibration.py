@@ -28,7 +28,7 @@ class Calibration(Value):
 
     Attributes
     ----------
-    latency : s, lidar stamps minus IMU clock: a lidar stamp t was measured at t - latency
+    latency : s, lidar stamps as they are read minus IMU clock: a stamp t was measured at t - latency
     mount : where the lidar is, seen from the IMU
     gyro_bias, accel_bias : (3,) rad/s, m/s²
     gravity : (3,) m/s², map frame, pointing up
@@ -37,6 +37,7 @@ class Calibration(Value):
         motor, in the IMU frame, `gyro_bias` (3,), `accel_bias` (3,), `gravity` (2,) rad, and for
         a motor `encoder_zero` (1,) rad, and of the lidar across the axis `motor_tilt` (2,) rad and
         `motor_offset` (2,) m
+    latency_read : s, what was taken off the lidar's stamps when they were read
     """
 
     latency: float
@@ -45,11 +46,18 @@ class Calibration(Value):
     accel_bias: NDArray[np.float64]
     gravity: NDArray[np.float64]
     std: dict[str, list[float]] = field(default_factory=dict)
+    latency_read: float = 0.0
+
+    @property
+    def source_latency(self) -> float:
+        """Lidar stamps as the recording has them minus IMU clock, s."""
+        return self.latency + self.latency_read
 
     def to_json(self) -> dict[str, Any]:
         """Return the calibration as run.json has it; the mount as payload.yaml does."""
         return {
-            "latency": self.latency,
+            "latency": self.source_latency,
+            "latency_read": self.latency_read,
             "mount": self.mount.to_json(),
             **{name: getattr(self, name).tolist() for name in _VECTORS},
             "std": self.std,
@@ -60,4 +68,6 @@ class Calibration(Value):
         """Read the calibration in a run.json, of earlier versions as well."""
         vectors = {name: np.array(described[name], float) for name in _VECTORS}
         mount = mount_from_json(described["mount"])
-        return cls(described["latency"], mount, **vectors, std=described["std"])
+        read = described.get("latency_read", 0.0)
+        latency = described["latency"] - read
+        return cls(latency, mount, **vectors, std=described["std"], latency_read=read)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from decimal import Decimal
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -36,6 +37,11 @@ class Clock:
     def to_absolute_text(self, times: NDArray[np.float64]) -> list[str]:
         """Return absolute seconds with nine exact decimals, as trajectory files want them."""
         return [format_ns(int(stamp_ns)) for stamp_ns in self.to_ns(np.atleast_1d(times))]
+
+
+def to_ns(seconds: float) -> int:
+    """Return a duration as written in whole ns, also one that a product with 1e9 would round."""
+    return round(Decimal(repr(float(seconds))) * NS_PER_S)
 
 
 def format_ns(stamp_ns: int) -> str:

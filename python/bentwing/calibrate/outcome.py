@@ -10,7 +10,8 @@ import numpy as np
 
 from bentwing.base.mount import FixedMount
 from bentwing.calibrate.motor_mount import OFFSET_PRIOR
-from bentwing.recording.payload import CalibrationRecord, Transform
+from bentwing.recording.sections.calibration import CalibrationRecord
+from bentwing.recording.sections.section import Transform
 
 if TYPE_CHECKING:
     from bentwing.base.calibration import Calibration
@@ -98,7 +99,7 @@ def with_motion(payload: Payload, found: Calibration) -> Payload:
     known = payload.calibration or CalibrationRecord()
     names = ["latency", "extrinsic_rotation", "extrinsic_translation"]
     update: dict[str, Any] = {
-        "lidar": payload.lidar.model_copy(update={"latency": round(found.latency, DIGITS)})
+        "lidar": payload.lidar.model_copy(update={"latency": round(found.source_latency, DIGITS)})
     }
     mount = found.mount
     if isinstance(mount, FixedMount):

@@ -59,5 +59,5 @@ def _changes(found: Calibrated) -> dict[str, list[float]]:
             "encoder_delay": [motor.delay],
         }
     if found.motion is not None:
-        changes["latency"] = [found.motion.latency]
+        changes["latency"] = [found.motion.source_latency]
     return changes

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bentwing.recording import ImuBatch
-    from bentwing.recording.payload import Imu
     from bentwing.recording.preprocess import StaticStart
+    from bentwing.recording.sections.imu import Imu
 
 _log = get_logger(__name__)
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -131,7 +132,8 @@ def _result(
 ) -> WindowResult:
     return WindowResult(
         trajectory=Trajectory(prior.times, found.samples.positions, found.samples.quats_xyzw),
-        calibration=Calibration(
+        calibration=replace(
+            start,
             latency=found.globals.latency,
             mount=refined_mount(start.mount, found.globals),
             gyro_bias=found.globals.gyro_bias,

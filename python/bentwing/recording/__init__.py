@@ -9,18 +9,14 @@ if TYPE_CHECKING:
     from bentwing.base.clock import Clock
     from bentwing.recording.batches import Batch, EncoderBatch, ImuBatch, LidarBatch
     from bentwing.recording.lidar_kinds import LidarKind
-    from bentwing.recording.payload import (
-        Box,
-        Encoder,
-        Gnss,
-        Imu,
-        Lidar,
-        Payload,
-        PayloadLike,
-        SelfHit,
-        Transform,
-    )
+    from bentwing.recording.payload import Payload, PayloadLike
     from bentwing.recording.recording import Recording
+    from bentwing.recording.sections.encoder import Encoder
+    from bentwing.recording.sections.gnss import Gnss
+    from bentwing.recording.sections.imu import Imu, ImuUnits
+    from bentwing.recording.sections.lidar import Lidar
+    from bentwing.recording.sections.section import Transform
+    from bentwing.recording.sections.self_hits import Box, SelfHit
 else:
     from bentwing.base.lazy import lazy
 
@@ -30,18 +26,14 @@ else:
             "base.clock": ["Clock"],
             "recording.batches": ["Batch", "EncoderBatch", "ImuBatch", "LidarBatch"],
             "recording.lidar_kinds": ["LidarKind"],
-            "recording.payload": [
-                "Box",
-                "Encoder",
-                "Gnss",
-                "Imu",
-                "Lidar",
-                "Payload",
-                "PayloadLike",
-                "SelfHit",
-                "Transform",
-            ],
+            "recording.payload": ["Payload", "PayloadLike"],
             "recording.recording": ["Recording"],
+            "recording.sections.encoder": ["Encoder"],
+            "recording.sections.gnss": ["Gnss"],
+            "recording.sections.imu": ["Imu", "ImuUnits"],
+            "recording.sections.lidar": ["Lidar"],
+            "recording.sections.section": ["Transform"],
+            "recording.sections.self_hits": ["Box", "SelfHit"],
         },
     )
 
@@ -54,6 +46,7 @@ __all__ = [
     "Gnss",
     "Imu",
     "ImuBatch",
+    "ImuUnits",
     "Lidar",
     "LidarBatch",
     "LidarKind",

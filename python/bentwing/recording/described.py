@@ -30,11 +30,15 @@ def described_mount(payload: Payload) -> Mount:
 
 
 def described_calibration(payload: Payload) -> Calibration:
-    """Return latency and mount as the payload describes them, without biases, gravity along z."""
+    """Return latency and mount as the payload describes them, without biases, gravity along z.
+
+    A large latency is taken off the stamps when they are read, so that no estimator meets it.
+    """
     return Calibration(
-        latency=payload.lidar.latency,
+        latency=payload.lidar.latency_left,
         mount=described_mount(payload),
         gyro_bias=np.zeros(3),
         accel_bias=np.zeros(3),
         gravity=np.array([0.0, 0.0, STANDARD_GRAVITY]),
+        latency_read=payload.lidar.latency_read,
     )

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bentwing.recording.batches import ImuBatch
+from bentwing.recording.readings import ACCEL_FACTORS, DEGREE
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -22,19 +23,19 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bentwing.recording.batches import Batch
+    from bentwing.recording.sections.imu import AccelUnit
 
 CHECKED = 60.0  # s of the recording's beginning; more would not change the judgement
 MIN_SAMPLES = 20
 MAX_RATE = 35.0  # rad/s, full scale of the fastest common gyros
 # m/s², median length; 0.3 m off the axis of a spin of 15 rad/s it is seven times gravity.
 ACCEL_RANGE = (4.0, 250.0)
-# Unit, the range of the median length that says so, and the factor that makes m/s² of it.
-ACCEL_UNITS = (
-    ("g", (0.5, 2.0), 9.80665),
-    ("cm/s²", (700.0, 990.0), 0.01),
-    ("milli-g", (990.0, 1500.0), 0.00980665),
+# Unit, and the range of the median length that says so.
+ACCEL_UNITS: tuple[tuple[AccelUnit, tuple[float, float]], ...] = (
+    ("g", (0.5, 2.0)),
+    ("cm/s2", (700.0, 990.0)),
+    ("milli-g", (990.0, 1500.0)),
 )
-DEGREE = np.pi / 180
 WINDOW = 0.3  # s over which the turn of gravity and of the gyro are compared
 # A reading is believed where it explains half of gravity's turning and four times better than
 # the samples as they are.
@@ -80,8 +81,9 @@ def in_si(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return gyro in rad/s and accel in m/s², as far as their units are known."""
     length = float(np.median(np.linalg.norm(accel, axis=1))) if len(accel) else 0.0
-    factors = [factor for _, (low, high), factor in ACCEL_UNITS if low <= length < high]
-    return gyro * gyro_scale(times, gyro, accel), accel * (factors[0] if factors else 1.0)
+    units = [unit for unit, (low, high) in ACCEL_UNITS if low <= length < high]
+    factor = ACCEL_FACTORS[units[0]] if units else 1.0
+    return gyro * gyro_scale(times, gyro, accel), accel * factor
 
 
 def gyro_scale(
@@ -104,11 +106,12 @@ def _accel_problem(accel: NDArray[np.float64]) -> str | None:
         return None
     if length == 0.0:
         return "the accelerations are all zero; switch the accelerometer on in the driver"
-    for unit, (low, high), factor in ACCEL_UNITS:
+    for unit, (low, high) in ACCEL_UNITS:
         if low <= length < high:
             return (
-                f"the accelerations are in {unit} (median length {length:.4g}, expected 9.8 "
-                f"m/s²); multiply by {factor:g} to get m/s² in the driver or the recording"
+                f"the accelerations are in {unit.replace('2', '²')} (median length {length:.4g}, "
+                f"expected 9.8 m/s²); say so in the payload with 'imu: {{units: {{accel: {unit}}}}}', or multiply by "
+                f"{ACCEL_FACTORS[unit]:g} in the driver"
             )
     return (
         f"the accelerations have a median length of {length:.4g}, expected 9.8 m/s²; check the "
@@ -120,7 +123,7 @@ def _gyro_problem(
     times: NDArray[np.float64], gyro: NDArray[np.float64], accel: NDArray[np.float64]
 ) -> str | None:
     fast = _fast_rate(gyro)
-    repair = "multiply by 0.0174533 to get rad/s in the driver or the recording"
+    repair = "say so in the payload with 'imu: {units: {gyro: deg/s}}', or multiply by 0.0174533 in the driver"
     if fast > MAX_RATE:
         return (
             f"the angular rates are in deg/s (up to {fast:.4g}, no common gyro measures beyond "
@@ -158,7 +161,8 @@ def mirrored_axis(
     names = " and ".join(name for name, sign in zip("xyz", best, strict=True) if sign < 0)
     return (
         f"gyro and accelerometer seem to disagree about the direction of axis {names}; if the head "
-        f"was not swung like a pendulum, flip the sign of {names} in one of them"
+        f"was not swung like a pendulum, flip the sign of {names} in one of them with imu.gyro_axes or "
+        "imu.axes of the payload"
     )
 
 

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from bentwing.base.clock import Clock
     from bentwing.recording.batches import LidarBatch
     from bentwing.recording.point_times import TimeReading
+    from bentwing.recording.readings import LidarReading
     from bentwing.recording.streams import RawMessage
 
 
@@ -33,7 +34,8 @@ class LidarStream:
     clock : of the recording
     cdr : ROS 2's encoding instead of ROS 1's
     use_recorder_time : the header stamps are all zero
-    reading : of the points' times, where the type needs one
+    reading : of the points
+    times : how the time of each point is read, where the type needs it
     needs_beam_times : refuse scans that do not tell when each beam was measured
     """
 
@@ -42,23 +44,33 @@ class LidarStream:
         topic: str,
         kind: str,
         clock: Clock,
+        reading: LidarReading,
         *,
         cdr: bool,
         use_recorder_time: bool,
-        reading: TimeReading | None,
+        times: TimeReading | None,
         needs_beam_times: bool,
     ) -> None:
         self.counts: Counter[str] = Counter()
-        self.monitor = StampMonitor(topic, use_recorder_time=use_recorder_time, counts=self.counts)
+        self.monitor = StampMonitor(
+            topic,
+            use_recorder_time=use_recorder_time,
+            counts=self.counts,
+            offset_ns=reading.offset_ns,
+        )
         self.n_points = 0
         self._topic, self._kind = topic, kind
         self._clock, self._needs_beam_times = clock, needs_beam_times
-        self._decoder = LIDAR_MESSAGES[kind](cdr=cdr, reading=reading)
+        self._reading = reading
+        self._decoder = LIDAR_MESSAGES[kind](
+            cdr=cdr, reading=times, range_scale=reading.range_scale
+        )
         self._merger = SweepMerger(self.counts)
 
     def decode(self, messages: Sequence[RawMessage]) -> LidarBatch | None:
         """Return the points of the next messages, as far as they are complete."""
-        batch = self._merger.push(self._batches(messages))
+        batches = [self._reading.batch(batch) for batch in self._batches(messages)]
+        batch = self._merger.push(batches)
         self.n_points += 0 if batch is None else len(batch.times)
         return batch
 

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
     from bentwing.base.clock import Clock
     from bentwing.recording.peek import Peek
+    from bentwing.recording.readings import Readings
     from bentwing.recording.streams import Stream
 
 
@@ -22,6 +23,7 @@ def open_streams(
     peeks: dict[str, Peek],
     roles: Sequence[str],
     clock: Clock,
+    readings: Readings,
     *,
     cdr: bool,
     needs_beam_times: bool,
@@ -32,6 +34,7 @@ def open_streams(
     ----------
     peeks : by role
     clock : of the recording
+    readings : of the samples, by the payload
     cdr : ROS 2's encoding instead of ROS 1's
     needs_beam_times : refuse scans that do not tell when each beam was measured
     """
@@ -49,21 +52,26 @@ def open_streams(
             packet_clock = packet_clocks[found.packet_clock]
             if found.lidar_packets is not None:
                 points = found.lidar_packets()
-                return PacketLidarStream(found.topic, clock, points, packet_clock, cdr=cdr)
+                return PacketLidarStream(
+                    found.topic, clock, points, packet_clock, readings.lidar, cdr=cdr
+                )
             if found.imu_packets is not None:
                 samples = found.imu_packets()
-                return PacketImuStream(found.topic, clock, samples, packet_clock, cdr=cdr)
+                return PacketImuStream(
+                    found.topic, clock, samples, packet_clock, readings.imu, cdr=cdr
+                )
         if role == "imu":
-            return ImuStream(name, clock, cdr=cdr, use_recorder_time=zero)
+            return ImuStream(name, clock, readings.imu, cdr=cdr, use_recorder_time=zero)
         if role == "encoder":
-            return EncoderStream(name, clock, cdr=cdr, use_recorder_time=zero)
+            return EncoderStream(name, clock, readings.encoder, cdr=cdr, use_recorder_time=zero)
         return LidarStream(
             name,
             found.topic.type,
             clock,
+            readings.lidar,
             cdr=cdr,
             use_recorder_time=zero,
-            reading=found.reading,
+            times=found.reading,
             needs_beam_times=needs_beam_times,
         )
 

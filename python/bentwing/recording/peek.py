@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -38,6 +38,7 @@ class Peek:
     point_times : sentence on how the time of each point is known, None where it is not
     reading : of the points' times, where the type of message needs one
     packet_clock : what the stamps of raw packets mean
+    joints : names in the messages of an encoder
     lidar_packets, imu_packets : makers of the decoder for raw packets, the one of the role
     """
 
@@ -48,8 +49,15 @@ class Peek:
     point_times: str | None = None
     reading: TimeReading | None = None
     packet_clock: ClockReading | None = None
+    joints: tuple[str, ...] = ()
     lidar_packets: Callable[[], LidarPackets] | None = None
     imu_packets: Callable[[], ImuPackets] | None = None
+
+    def shifted(self, offset_ns: int) -> Peek:
+        """Return the same with stamps to which an offset is added, ns."""
+        return replace(
+            self, first_ns=self.first_ns + offset_ns, offset_ns=self.offset_ns + offset_ns
+        )
 
 
 def peek(source: Source, topic: TopicInfo) -> Peek:

@@ -38,12 +38,19 @@ def point_times(lidar_topic: str, lidar_type: str) -> str:
     )
 
 
-def clocks(lidar: Peek, other: Peek) -> str | None:
-    """Return the sentence on two sensors stamped by different clocks, None if they share one."""
+def clocks(lidar: Peek, other: Peek, section: str, offset: float) -> str | None:
+    """Return the sentence on two sensors stamped by different clocks, None if they share one.
+
+    Parameters
+    ----------
+    section : of the payload that describes the other
+    offset : s, what it adds to the stamps already
+    """
     difference = (other.offset_ns - lidar.offset_ns) / NS_PER_S
     if abs(difference) <= MAX_CLOCK_OFFSET:
         return None
     return (
         f"{other.topic.name} and {lidar.topic.name} are stamped by clocks {difference:+.1f} s "
-        "apart; let both drivers stamp with the host's clock, or synchronize them, and record again"
+        f"apart; say so in the payload with '{section}: {{clock_offset: {offset - difference:.3f}}}', or "
+        "let both drivers stamp with the host's clock and record again"
     )

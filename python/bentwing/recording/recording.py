@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,10 +14,12 @@ from bentwing.base.log import get_logger
 from bentwing.recording import imu_units, problems
 from bentwing.recording.containers.source import open_source
 from bentwing.recording.fixes import Fixes, read_fixes
+from bentwing.recording.joints import peek_joints, unclear_joint
 from bentwing.recording.open_streams import open_streams
 from bentwing.recording.packets.peek import peek_imu, peek_lidar
 from bentwing.recording.payload import as_payload
 from bentwing.recording.peek import Peek, peek
+from bentwing.recording.readings import Readings
 from bentwing.recording.slots import group_into_slots, trimmed
 from bentwing.recording.stream_warnings import stream_warnings
 from bentwing.recording.topics import NAV_SAT_FIX, PACKET_TYPES, resolve
@@ -64,6 +67,7 @@ class Recording:
         listed = [paths] if isinstance(paths, (str, Path)) else list(paths)
         self.paths = [Path(path) for path in listed]
         self.payload = as_payload(payload)
+        self._readings = Readings.of(self.payload)
         self.strict = strict
         self._source = open_source(self.paths)
         self._streams: dict[str, Stream] = {}
@@ -80,7 +84,8 @@ class Recording:
         is_alone = all(topic.type in PACKET_TYPES for topic in found.values())
         self._peeks: dict[str, Peek] = {}
         for role, topic in found.items():
-            self._peeks[role] = self._peek(role, topic, is_alone=is_alone)
+            offset_ns: int = getattr(self._readings, role).offset_ns
+            self._peeks[role] = self._peek(role, topic, is_alone=is_alone).shifted(offset_ns)
         self.clock = Clock(min(found.first_ns for found in self._peeks.values()))
         for role, peeked in self._peeks.items():
             _log.info("%s: %s (%s)", role, peeked.topic.name, peeked.topic.type)
@@ -88,6 +93,9 @@ class Recording:
             self.check()
 
     def _peek(self, role: str, topic: TopicInfo, *, is_alone: bool) -> Peek:
+        if role == "encoder":
+            joints = peek_joints(self._source, topic, self._readings.encoder.joint)
+            return replace(peek(self._source, topic), joints=joints)
         if topic.type not in PACKET_TYPES:
             return peek(self._source, topic)
         if role == "lidar":
@@ -122,10 +130,13 @@ class Recording:
 
     def clock_problems(self) -> list[str]:
         """Return a sentence for each sensor that does not share the lidar's clock."""
-        lidar = self._peeks["lidar"]
-        others = [self._peeks[role] for role in ("imu", "encoder") if role in self._peeks]
-        found = [problems.clocks(lidar, other) for other in others]
-        return [problem for problem in found if problem is not None]
+        found: list[str] = []
+        for role, section in (("imu", self.payload.imu), ("encoder", self.payload.encoder)):
+            if section is not None and role in self._peeks:
+                offset = section.clock_offset
+                problem = problems.clocks(self._peeks["lidar"], self._peeks[role], role, offset)
+                found += [] if problem is None else [problem]
+        return found
 
     def imu_batches(self) -> Iterator[Batch]:
         """Yield the IMU's samples alone, in a pass of their own that leaves the counts as is."""
@@ -169,6 +180,11 @@ class Recording:
     def encoder_topic(self) -> str | None:
         """The encoder's topic, None without encoder."""
         return self._topic("encoder")
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """The joints on the encoder's topic, of which the payload names one; none without encoder."""
+        return self._peeks["encoder"].joints if "encoder" in self._peeks else ()
 
     @property
     def has_fixes(self) -> bool:
@@ -246,6 +262,8 @@ class Recording:
                     f"{found.topic.name}: all header stamps are zero, the recorder's time is used "
                     "instead; let the driver stamp its messages, or expect jitter"
                 )
+            if len(found.joints) > 1 and self._readings.encoder.joint is None:
+                sentences.append(unclear_joint(found.topic, found.joints))
             if role in self._streams:
                 sentences += stream_warnings(found.topic.name, self._streams[role], self.clock)
         return sentences
@@ -324,7 +342,9 @@ class Recording:
 
     def _open_streams(self, roles: Sequence[str]) -> dict[str, Stream]:
         cdr, strict = self._source.cdr, self.strict
-        return open_streams(self._peeks, roles, self.clock, cdr=cdr, needs_beam_times=strict)
+        return open_streams(
+            self._peeks, roles, self.clock, self._readings, cdr=cdr, needs_beam_times=strict
+        )
 
     def _topic(self, role: str) -> str | None:
         return self._peeks[role].topic.name if role in self._peeks else None

@@ -33,13 +33,16 @@ class StampMonitor:
     topic : for messages
     use_recorder_time : the header stamps are all zero, so the recorder's clock has to do
     counts : receives `backwards_stamps`, `duplicate_stamps`, `stamp_jumps`
+    offset_ns : added to every stamp, by the payload
     """
 
-    def __init__(self, topic: str, *, use_recorder_time: bool, counts: Counter[str]) -> None:
+    def __init__(
+        self, topic: str, *, use_recorder_time: bool, counts: Counter[str], offset_ns: int = 0
+    ) -> None:
         self.gaps: list[Gap] = []
         self.first_backwards_ns: int | None = None
         self._topic, self._counts = topic, counts
-        self._use_recorder_time = use_recorder_time
+        self._use_recorder_time, self._offset_ns = use_recorder_time, offset_ns
         self._last_ns: int | None = None
         self._last_offset_ns = 0
         self._n_jumps = 0
@@ -48,7 +51,7 @@ class StampMonitor:
 
     def accept(self, header_ns: int, recorder_ns: int) -> int | None:
         """Return the stamp to use in ns, or None for a message to drop."""
-        stamp_ns = recorder_ns if self._use_recorder_time else header_ns
+        stamp_ns = (recorder_ns if self._use_recorder_time else header_ns) + self._offset_ns
         offset_ns = stamp_ns - recorder_ns
         if self._last_ns is None:
             self._take(stamp_ns, offset_ns)

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from bentwing.base.clock import Clock
     from bentwing.recording.batches import Batch
+    from bentwing.recording.readings import EncoderReading, ImuReading
 
 RawMessage = tuple[int, bytes]  # recorder's time in ns, bytes
 MAX_ENCODER_ANGLE = 1e6  # rad; more is damage
@@ -41,10 +42,23 @@ class Stream(Protocol):
 class ImuStream:
     """sensor_msgs/Imu."""
 
-    def __init__(self, topic: str, clock: Clock, *, cdr: bool, use_recorder_time: bool) -> None:
+    def __init__(
+        self,
+        topic: str,
+        clock: Clock,
+        reading: ImuReading,
+        *,
+        cdr: bool,
+        use_recorder_time: bool,
+    ) -> None:
         self.counts: Counter[str] = Counter()
-        self.monitor = StampMonitor(topic, use_recorder_time=use_recorder_time, counts=self.counts)
-        self._clock, self._cdr = clock, cdr
+        self.monitor = StampMonitor(
+            topic,
+            use_recorder_time=use_recorder_time,
+            counts=self.counts,
+            offset_ns=reading.offset_ns,
+        )
+        self._clock, self._reading, self._cdr = clock, reading, cdr
 
     def decode(self, messages: Sequence[RawMessage]) -> ImuBatch | None:
         """Return the samples of the next messages."""
@@ -61,7 +75,8 @@ class ImuStream:
                 bodies.append(body)
         self.counts["samples"] += len(stamps_ns)
         values = np.frombuffer(b"".join(bodies), "<f8").reshape(-1, 37).astype(np.float64)
-        gyro, accel = values[:, 13:16], values[:, 25:28]
+        gyro = self._reading.gyro.vectors(values[:, 13:16])
+        accel = self._reading.accel.vectors(values[:, 25:28])
         keep = usable_samples(gyro, accel, self.counts)
         if not keep.any():
             return None
@@ -86,12 +101,25 @@ def usable_samples(
 
 
 class EncoderStream:
-    """sensor_msgs/JointState, position[0], unwrapped over the whole pass."""
+    """sensor_msgs/JointState, the position of one joint, unwrapped over the whole pass."""
 
-    def __init__(self, topic: str, clock: Clock, *, cdr: bool, use_recorder_time: bool) -> None:
+    def __init__(
+        self,
+        topic: str,
+        clock: Clock,
+        reading: EncoderReading,
+        *,
+        cdr: bool,
+        use_recorder_time: bool,
+    ) -> None:
         self.counts: Counter[str] = Counter()
-        self.monitor = StampMonitor(topic, use_recorder_time=use_recorder_time, counts=self.counts)
-        self._clock, self._cdr = clock, cdr
+        self.monitor = StampMonitor(
+            topic,
+            use_recorder_time=use_recorder_time,
+            counts=self.counts,
+            offset_ns=reading.offset_ns,
+        )
+        self._clock, self._reading, self._cdr = clock, reading, cdr
         self._last_angle: float | None = None
 
     def decode(self, messages: Sequence[RawMessage]) -> EncoderBatch | None:
@@ -99,9 +127,13 @@ class EncoderStream:
         stamps_ns, angles = [], []
         for recorder_ns, raw in messages:
             try:
-                header_ns, angle = wire.joint_position(raw, cdr=self._cdr)
+                header_ns, joints = wire.joints(raw, cdr=self._cdr)
             except wire.BrokenMessageError:
                 self.counts["broken_messages"] += 1
+                continue
+            angle = joints.position(self._reading.joint)
+            if angle is None:  # several drivers may share a topic, each with joints of its own
+                self.counts["other_joints"] += 1
                 continue
             if not abs(angle) < MAX_ENCODER_ANGLE:
                 self.counts["nan"] += 1
@@ -114,7 +146,8 @@ class EncoderStream:
         if not stamps_ns:
             return None
         first = [] if self._last_angle is None else [self._last_angle]
-        unwrapped = np.unwrap(np.array([*first, *angles]))[len(first) :]
+        turned = self._reading.angles(np.array(angles))
+        unwrapped = np.unwrap(np.concatenate([first, turned]))[len(first) :]
         self._last_angle = float(unwrapped[-1])
         return EncoderBatch(self._clock.to_seconds(np.array(stamps_ns, dtype=np.int64)), unwrapped)
 

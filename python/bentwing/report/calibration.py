@@ -27,7 +27,7 @@ def calibration_table(calibration: Mapping[str, Any] | None) -> str:
     found = Calibration.from_json(calibration)
     std = found.std
     rows = [
-        _row("lidar latency, ms", [found.latency], std.get("latency"), 1e3, 3),
+        _row("lidar latency, ms", [found.source_latency], std.get("latency"), 1e3, 3),
         *_mount_rows(found.mount, std),
         _row("gyro bias, °/s", found.gyro_bias, std.get("gyro_bias"), DEGREES, 4),
         _row("accelerometer bias, m/s²", found.accel_bias, std.get("accel_bias"), 1.0, 4),

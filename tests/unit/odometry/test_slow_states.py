@@ -10,7 +10,7 @@ from bentwing.base import geometry
 from bentwing.base.calibration import STANDARD_GRAVITY
 from bentwing.odometry.continuous.slow_states import INITIAL_STD, SLICES, SlowStatePrior
 from bentwing.odometry.start import attitude_of
-from bentwing.recording.payload import Imu
+from bentwing.recording.sections.imu import Imu
 
 BIAS, GRAVITY = SLICES["accel_bias"], SLICES["gravity"]
 

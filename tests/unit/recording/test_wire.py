@@ -37,17 +37,25 @@ def test_imu_is_read_whatever_the_alignment_after_the_frame_id(ros, frame):
     np.testing.assert_array_equal(values[25:28], [4, 5, 6])
 
 
-@pytest.mark.parametrize("names", [(), ("m",), ("motor",), ("motor", "second joint")])
-def test_joint_position_is_read_after_names_of_any_length(ros, names):
-    raw = ros.serialize(ros.joint(0.25, 1.5, names=names))
-    assert wire.joint_position(raw, cdr=not ros.ros1) == (STAMP_NS, 1.5)
+@pytest.mark.parametrize("names", [(), ("m",), ("motor",), ("motor", "zweites Gelenk, é")])
+def test_joints_are_read_with_names_of_any_length(ros, names):
+    raw = ros.serialize(ros.joint(0.25, (1.5, -2.5), names=names))
+    stamp_ns, joints = wire.joints(raw, cdr=not ros.ros1)
+    assert (stamp_ns, joints) == (STAMP_NS, (names, (1.5, -2.5)))
+
+
+def test_a_joint_is_found_by_its_name(ros):
+    raw = ros.serialize(ros.joint(0.25, (1.5, -2.5), names=("pan", "tilt", "without position")))
+    _, joints = wire.joints(raw, cdr=not ros.ros1)
+    found = [joints.position(name) for name in (None, "pan", "tilt", "without position", "roll")]
+    assert found == [1.5, 1.5, -2.5, None, None]
 
 
 def test_joint_state_without_position_is_broken(ros):
     message = ros.joint(0.25, 1.5)
     message.position = np.zeros(0)
     with pytest.raises(wire.BrokenMessageError, match="no position"):
-        wire.joint_position(ros.serialize(message), cdr=not ros.ros1)
+        wire.joints(ros.serialize(message), cdr=not ros.ros1)
 
 
 @pytest.mark.parametrize("frame", FRAMES)

@@ -103,7 +103,7 @@ def score(simulated: Path, run: Path) -> Score:
 def _calibration_errors(found: Calibration, true: Calibration) -> dict[str, Array]:
     """Found minus true, by the names and in the units of the standard deviations."""
     errors = {
-        "latency": np.array([found.latency - true.latency]),
+        "latency": np.array([found.source_latency - true.source_latency]),
         "gyro_bias": found.gyro_bias - true.gyro_bias,
         "accel_bias": found.accel_bias - true.accel_bias,
     }

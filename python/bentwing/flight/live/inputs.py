@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bentwing.base.clock import NS_PER_S
 from bentwing.recording.batches import EncoderBatch, ImuBatch, LidarBatch
+from bentwing.recording.readings import EncoderReading, ImuReading, LidarReading
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -19,26 +21,39 @@ _LONGEST = 1e8
 
 
 class InputOrder:
-    """Makes batches of arrays, refusing what goes back in time within one sensor."""
+    """Makes batches of arrays, refusing what goes back in time within one sensor.
+
+    The readings are those of the payload; without one the samples are batches' already.
+    """
 
     def __init__(self) -> None:
         self._newest: dict[type[Batch], float] = {}
 
-    def imu(self, times: ArrayLike, gyro: ArrayLike, accel: ArrayLike) -> ImuBatch:
+    def imu(
+        self,
+        times: ArrayLike,
+        gyro: ArrayLike,
+        accel: ArrayLike,
+        reading: ImuReading = ImuReading(),  # noqa: B008 - frozen
+    ) -> ImuBatch:
         """Return inertial samples, one or many."""
-        stamps = self._times("IMU", ImuBatch, times)
+        stamps = self._times("IMU", ImuBatch, times, reading.offset_ns)
         return ImuBatch(
             stamps,
-            _table("IMU", "gyro", gyro, stamps),
-            _table("IMU", "accel", accel, stamps),
+            reading.gyro.vectors(_table("IMU", "gyro", gyro, stamps)),
+            reading.accel.vectors(_table("IMU", "accel", accel, stamps)),
         )
 
     def points(
-        self, points: ArrayLike, times: ArrayLike, rings: ArrayLike | None = None
+        self,
+        points: ArrayLike,
+        times: ArrayLike,
+        rings: ArrayLike | None = None,
+        reading: LidarReading = LidarReading(),  # noqa: B008 - frozen
     ) -> LidarBatch:
         """Return returns of the lidar."""
-        stamps = self._times("point", LidarBatch, times)
-        table = _table("point", "points", points, stamps)
+        stamps = self._times("point", LidarBatch, times, reading.offset_ns)
+        table = reading.points(_table("point", "points", points, stamps))
         if rings is None:
             return LidarBatch(table, stamps)
         numbers = np.array(rings, dtype=np.float64, ndmin=1)
@@ -51,23 +66,32 @@ class InputOrder:
             raise ValueError(msg)
         return LidarBatch(table, stamps, ring=numbers.astype(np.uint16))
 
-    def encoder(self, times: ArrayLike, angles: ArrayLike) -> EncoderBatch:
+    def encoder(
+        self,
+        times: ArrayLike,
+        angles: ArrayLike,
+        reading: EncoderReading = EncoderReading(),  # noqa: B008 - frozen
+    ) -> EncoderBatch:
         """Return angles of the motor, one or many."""
-        stamps = self._times("encoder", EncoderBatch, times)
+        stamps = self._times("encoder", EncoderBatch, times, reading.offset_ns)
         values = np.array(angles, dtype=np.float64, ndmin=1)
         if values.shape != stamps.shape:
             msg = f"{_named('encoder', stamps)}: angles: expected shape {stamps.shape}, got {values.shape}"
             raise ValueError(msg)
         _require_finite("encoder", "angles", values, stamps)
-        return EncoderBatch(stamps, values)
+        return EncoderBatch(stamps, reading.angles(values))
 
     def accept(self, batch: Batch) -> None:
         """Remember a batch that was taken."""
         self._newest[type(batch)] = float(batch.times[-1])
 
-    def _times(self, sensor: str, kind: type[Batch], times: ArrayLike) -> NDArray[np.float64]:
+    def _times(
+        self, sensor: str, kind: type[Batch], times: ArrayLike, offset_ns: int
+    ) -> NDArray[np.float64]:
         # A copy: drivers fill the same buffer again.
         stamps = np.array(times, dtype=np.float64, ndmin=1)
+        if offset_ns:
+            stamps += offset_ns / NS_PER_S
         if stamps.ndim != 1:
             msg = f"{sensor} batch: times: expected shape (N,), got {stamps.shape}"
             raise ValueError(msg)

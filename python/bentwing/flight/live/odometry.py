@@ -26,6 +26,7 @@ from bentwing.odometry import create
 from bentwing.recording.batches import EncoderBatch, ImuBatch, LidarBatch
 from bentwing.recording.payload import as_payload
 from bentwing.recording.preprocess import Preprocessing
+from bentwing.recording.readings import ImuReading, Readings
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -82,7 +83,7 @@ class Odometry:
             msg = f"max_map_points and max_lag: expected above zero, got {max_map_points}, {max_lag} s"
             raise UsageError(msg)
         head, n_threads = as_payload(payload), thread_count(threads)
-        self._payload = head
+        self._payload, self._readings = head, Readings.of(head)
         self._spin = None if usual_rate is None else StallWatch(usual_rate)
         self._backlog = Backlog(max_lag)
         self._dropped: Counter[str] = Counter({"live.points_dropped": 0})
@@ -110,16 +111,21 @@ class Odometry:
         Parameters
         ----------
         times : (M,) or a number, s, IMU clock, not before what was added last
-        gyro : (M, 3) or (3,), rad/s, imu frame
-        accel : (M, 3) or (3,), m/s², imu frame (specific force: +g upwards at rest)
+        gyro : (M, 3) or (3,), rad/s, imu frame, or in the units and on the axes that the payload names
+        accel : (M, 3) or (3,), m/s², imu frame (specific force: +g upwards at rest), or likewise
 
         Raises
         ------
         ValueError
             If the batch cannot be used; nothing of it is taken.
         """
+        self._add_imu(times, gyro, accel, self._readings.imu)
+
+    def _add_imu(
+        self, times: ArrayLike, gyro: ArrayLike, accel: ArrayLike, reading: ImuReading
+    ) -> None:
         with self._feeding:
-            batch = self._order.imu(times, gyro, accel)
+            batch = self._order.imu(times, gyro, accel, reading)
             if self._payload.imu is None or self._state.began_without_imu:
                 msg = (
                     f"IMU batch at {batch.times[:1]} s: the estimate goes without inertial samples; "
@@ -135,7 +141,7 @@ class Odometry:
 
         Parameters
         ----------
-        points : (N, 3), m, lidar frame
+        points : (N, 3), m, lidar frame, or scaled and mirrored as the payload says
         times : (N,), s, lidar clock, non-decreasing, not before what was added last
         rings : (N,), beam numbers of a multi-beam lidar, for `kalman`, which is better with them
 
@@ -145,7 +151,7 @@ class Odometry:
             If the batch cannot be used; nothing of it is taken.
         """
         with self._feeding:
-            self._take(self._order.points(points, times, rings))
+            self._take(self._order.points(points, times, rings, self._readings.lidar))
 
     def add_encoder(self, times: ArrayLike, angles: ArrayLike) -> None:
         """Take angles of the motor that turns the lidar, one or many.
@@ -153,7 +159,7 @@ class Odometry:
         Parameters
         ----------
         times : (K,) or a number, s, lidar clock, not before what was added last
-        angles : (K,) or a number, rad, unwrapped (continuous over full turns)
+        angles : (K,) or a number, rad or the payload's unit, unwrapped (continuous over full turns)
 
         Raises
         ------
@@ -161,16 +167,19 @@ class Odometry:
             If the batch cannot be used; nothing of it is taken.
         """
         with self._feeding:
-            self._take(self._order.encoder(times, angles))
+            self._take(self._order.encoder(times, angles, self._readings.encoder))
 
     def feed(self, batch: Batch) -> None:
         """Take a batch as a `Recording` streams it, to replay one."""
-        if isinstance(batch, LidarBatch):
-            self.add_points(batch.points, batch.times, batch.ring)
-        elif isinstance(batch, ImuBatch):
-            self.add_imu(batch.times, batch.gyro, batch.accel)
-        else:
-            self.add_encoder(batch.times, batch.angles)
+        # A recording has read its samples as the payload says already.
+        if isinstance(batch, ImuBatch):
+            self._add_imu(batch.times, batch.gyro, batch.accel, ImuReading())
+            return
+        with self._feeding:
+            if isinstance(batch, LidarBatch):
+                self._take(self._order.points(batch.points, batch.times, batch.ring))
+            else:
+                self._take(self._order.encoder(batch.times, batch.angles))
 
     def pose(self, at: float | None = None) -> StampedPose:
         """Return the pose of the IMU in the map; takes well below a millisecond.
@@ -180,7 +189,7 @@ class Odometry:
 
         Parameters
         ----------
-        at : s, IMU clock; default: the newest inertial sample (without an IMU: the newest point)
+        at : s, IMU clock with the payload's `clock_offset`; default: the newest inertial sample (without an IMU: the newest point)
 
         Raises
         ------

@@ -21,7 +21,7 @@ from bentwing.odometry.planar import is_plane
 from bentwing.odometry.segments import JUDGED, MAX_IMU_GAP, found_again
 from bentwing.odometry.stall import LOST_AFTER
 from bentwing.recording import ImuBatch, LidarBatch
-from bentwing.recording.described import described_mount
+from bentwing.recording.described import described_calibration
 
 if TYPE_CHECKING:
     from bentwing.base.estimate import Estimate
@@ -50,7 +50,7 @@ class Continuous(Estimator):
         super().__init__()
         self.settings: ContinuousSettings = settings or ContinuousSettings()
         self._payload = payload
-        self._mount = described_mount(payload)
+        self._described = described_calibration(payload)
         self._threads = threads or 0
         self._phase: Phase = Waiting()
         # What came before the last break.
@@ -139,7 +139,7 @@ class Continuous(Estimator):
         self, passes: list[OdometryPass], breaks: list[Break], first_turn: float
     ) -> Estimate:
         return estimate_of(
-            passes, self._mount, breaks, first_turn=first_turn, has_imu=self._has_imu
+            passes, self._described, breaks, first_turn=first_turn, has_imu=self._has_imu
         )
 
     def _ready_until(self, *, finishing: bool) -> float | None:

@@ -3,11 +3,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing.base.calibration import STANDARD_GRAVITY, Calibration
+from bentwing.base.calibration import STANDARD_GRAVITY
 from bentwing.base.estimate import Estimate
 from bentwing.base.trajectory import DT
 from bentwing.odometry.continuous.odometry_pass import MARGIN
@@ -20,14 +21,14 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from bentwing.base.breaks import Break
-    from bentwing.base.mount import Mount
+    from bentwing.base.calibration import Calibration
     from bentwing.base.window_record import WindowRecord
     from bentwing.odometry.continuous.odometry_pass import OdometryPass
 
 
 def estimate_of(
     passes: Sequence[OdometryPass],
-    described: Mount,
+    described: Calibration,
     breaks: Sequence[Break],
     *,
     first_turn: float,
@@ -38,7 +39,7 @@ def estimate_of(
     Parameters
     ----------
     passes : at least one; between two of them the recording breaks
-    described : the mount as the payload has it
+    described : the slow states as the payload has them
     breaks : that were judged
     first_turn : s, before which the head of a 2D lidar had not turned once, and saw single planes
     has_imu : whether there are inertial samples
@@ -48,9 +49,10 @@ def estimate_of(
     windows = [w for p in passes for w in p.windows]
     n_blind = sum(p.n_blind for p in passes)
     slow = last.globals
-    calibration = Calibration(
+    calibration = replace(
+        described,
         latency=slow.latency,
-        mount=refined_mount(described, slow),
+        mount=refined_mount(described.mount, slow),
         gyro_bias=slow.gyro_bias,
         accel_bias=slow.accel_bias,
         gravity=np.array([0.0, 0.0, STANDARD_GRAVITY]),

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from bentwing.recording.payload import Imu
+    from bentwing.recording.sections.imu import Imu
 
 N_STATES = 20
 # Order of the core's `registration::index`.

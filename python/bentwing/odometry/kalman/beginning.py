@@ -14,6 +14,7 @@ from bentwing.recording.described import described_calibration
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from bentwing.base.calibration import Calibration
     from bentwing.base.mount import Mount
     from bentwing.odometry.kalman.core import FilterState
     from bentwing.odometry.start import Start
@@ -46,15 +47,14 @@ class Beginning:
     Attributes
     ----------
     time : s, IMU clock
-    latency : s, as the payload says; sweeps are cut by stamps that are so late
-    mount : as the filter takes it
+    described : slow states as the payload says, with the mount as the filter takes it; sweeps are cut
+        by stamps that are late by its latency
     rest : what the IMU says at rest, if that is how it begins
     state, covariance : at the time
     """
 
     time: float
-    latency: float
-    mount: Mount
+    described: Calibration
     rest: Rest | None
     state: FilterState
     covariance: NDArray[np.float64]
@@ -65,8 +65,7 @@ def described_beginning(time: float, start: Start, payload: Payload, mount: Moun
     static, described = start.static, replace(described_calibration(payload), mount=mount)
     return Beginning(
         time,
-        described.latency,
-        mount,
+        described,
         None if static is None else Rest(static.gyro_bias, static.accel_mean),
         first_state(start, described),
         first_covariance(start, mount),

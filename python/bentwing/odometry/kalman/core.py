@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from bentwing.base.calibration import Calibration
     from bentwing.odometry.kalman.settings import KalmanSettings
     from bentwing.odometry.start import Start
-    from bentwing.recording.payload import Imu, Lidar
+    from bentwing.recording.sections.imu import Imu
+    from bentwing.recording.sections.lidar import Lidar
 
     Transform = tuple[list[float], list[float]]
 

@@ -211,7 +211,7 @@ class Kalman(Estimator):
     def _new_pass(self, beginning: Beginning, *, renew: bool) -> FilterPass:
         """Return a pass; `renew`: its voxels forget what is old."""
         settings = FilterSettings.of(
-            self.settings, self._payload.lidar, self._imu, beginning.mount, renew=renew
+            self.settings, self._payload.lidar, self._imu, beginning.described.mount, renew=renew
         )
         self._n_begun += 1
         return FilterPass(settings, beginning)

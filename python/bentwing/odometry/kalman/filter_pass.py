@@ -58,8 +58,8 @@ class FilterPass:
             state=state,
             covariance=np.ascontiguousarray(anchored(beginning.covariance, state)),
         )
-        self.start, self.mount = beginning.time, beginning.mount
-        self.latency = beginning.latency
+        self.start, self.described = beginning.time, beginning.described
+        self.latency, self.mount = beginning.described.latency, beginning.described.mount
         self.windows: list[WindowRecord] = []
         self.blind = 0.0
         self.seconds = 0.0
@@ -118,7 +118,7 @@ class FilterPass:
         return FilterSnapshot(
             self.end + self.latency,
             np.array(self.filter.gravity),
-            calibration_of(self.filter, self.motor_rate, self.mount),
+            calibration_of(self.filter, self.motor_rate, self.described),
             [*self.windows],
             [*self._poses],
             self.blind,

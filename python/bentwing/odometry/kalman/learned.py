@@ -3,11 +3,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing.base.calibration import STANDARD_GRAVITY, Calibration
+from bentwing.base.calibration import STANDARD_GRAVITY
 from bentwing.base.mount import FixedMount, MotorMount, Mount, Pose
 from bentwing.odometry.kalman.core import (
     ACCEL_BIAS,
@@ -25,16 +26,20 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bentwing import _core
+    from bentwing.base.calibration import Calibration
 
 
-def calibration_of(filter_: _core.KalmanFilter, motor_rate: float, mount: Mount) -> Calibration:
+def calibration_of(
+    filter_: _core.KalmanFilter, motor_rate: float, described: Calibration
+) -> Calibration:
     """Return the slow states with their standard deviations.
 
     Parameters
     ----------
     motor_rate : rad/s, at which the motor turns
-    mount : with which the filter began
+    described : with which the filter began
     """
+    mount = described.mount
     std = np.sqrt(np.maximum(np.diag(filter_.covariance), 0.0))
     named = {
         "latency": std[LATENCY],
@@ -55,7 +60,8 @@ def calibration_of(filter_: _core.KalmanFilter, motor_rate: float, mount: Mount)
         named["motor_offset"] = _across(
             covariance[LIDAR_TRANSLATION, LIDAR_TRANSLATION], mount.axis
         )
-    return Calibration(
+    return replace(
+        described,
         latency=filter_.latency,
         mount=found,
         gyro_bias=np.array(filter_.gyro_bias),

@@ -35,13 +35,18 @@ class LidarDecoder(ABC, Generic[Message]):
     ----------
     cdr : ROS 2's encoding instead of ROS 1's
     reading : of the points' times, where `point_times` found that it needs one
+    range_scale : m per unit of the ranges, where it takes limits of range from the messages; the points
+        are handed out in the unit of the messages
     """
 
     is_planar: ClassVar[bool] = False
 
-    def __init__(self, *, cdr: bool, reading: TimeReading | None = None) -> None:
+    def __init__(
+        self, *, cdr: bool, reading: TimeReading | None = None, range_scale: float = 1.0
+    ) -> None:
         self.cdr = cdr
         self.reading = reading
+        self.range_scale = range_scale
 
     @abstractmethod
     def point_times(

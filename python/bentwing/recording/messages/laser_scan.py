@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+REACH = 30.0  # m, of a usual 2D lidar
 MAX_SWEEP = 10.0  # s; a longer scan is a damaged time_increment
 
 
@@ -62,7 +63,7 @@ class LaserScans(LidarDecoder[RawScan]):
         self, messages: Sequence[RawScan], starts: NDArray[np.float64], counts: Counter[str]
     ) -> list[LidarBatch]:
         """Return the points in the scan plane."""
-        return points_of_scans(messages, starts, counts)
+        return points_of_scans(messages, starts, counts, self.range_scale)
 
 
 class MultiEchoScans(LaserScans):
@@ -84,7 +85,10 @@ def is_sane(scan: RawScan) -> bool:
 
 
 def points_of_scans(
-    scans: Sequence[RawScan], starts: NDArray[np.float64], counts: Counter[str]
+    scans: Sequence[RawScan],
+    starts: NDArray[np.float64],
+    counts: Counter[str],
+    range_scale: float = 1.0,
 ) -> list[LidarBatch]:
     """Return the valid returns of consecutive scans, one batch per run of equal geometry.
 
@@ -93,12 +97,13 @@ def points_of_scans(
     scans : all `is_sane`
     starts : (S,) s, time of each scan's first beam
     counts : receives `returns` (all beams), `nan`, `inf`, `zero`, `out_of_range`
+    range_scale : m per unit of the ranges
     """
     batches = []
     pairs = zip(scans, starts.tolist(), strict=True)
     for _, run in itertools.groupby(pairs, key=lambda pair: _geometry(pair[0])):
         members, times = zip(*run, strict=True)
-        batches.append(_points_of_run(members, np.array(times), counts))
+        batches.append(_points_of_run(members, np.array(times), counts, range_scale))
     return batches
 
 
@@ -107,12 +112,16 @@ def _geometry(scan: RawScan) -> tuple[float | int | bool, ...]:
 
 
 def _points_of_run(
-    scans: Sequence[RawScan], starts: NDArray[np.float64], counts: Counter[str]
+    scans: Sequence[RawScan],
+    starts: NDArray[np.float64],
+    counts: Counter[str],
+    range_scale: float,
 ) -> LidarBatch:
     head = scans[0]
     shape = len(scans), len(head.ranges)
     ranges = _joined([scan.ranges for scan in scans]).reshape(shape)
-    keep = _valid(ranges, head.range_min, head.range_max, counts)
+    low, high = _limits(head, range_scale)
+    keep = _valid(ranges, low, high, counts)
     # All beams are placed and the valid ones taken: that is cheaper than to find each one's angle.
     distances = np.where(keep, ranges, 0).astype(np.float64)
     cosines, sines = _directions(head.angle_min, head.angle_increment, shape[1])
@@ -124,6 +133,19 @@ def _points_of_run(
     if head.intensities is not None:
         intensity = _joined([s.intensities for s in scans if s.intensities is not None])
     return LidarBatch(points.reshape(-1, 3), times.ravel(), intensity).where(keep.ravel())
+
+
+def _limits(head: RawScan, range_scale: float) -> tuple[float, float]:
+    """Return the least and greatest range in the unit of the ranges.
+
+    A driver that gives ranges in millimetres may give its limits in either unit: they are in the one in
+    which the lidar's reach is nearer to that of lidars.
+    """
+    low, high = head.range_min, head.range_max
+    if range_scale == 1.0 or not high > 0:
+        return low, high
+    is_scaled, is_metric = (abs(math.log(reach / REACH)) for reach in (high * range_scale, high))
+    return (low, high) if is_scaled <= is_metric else (low / range_scale, high / range_scale)
 
 
 def _valid(

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import functools
 import struct
-from typing import TYPE_CHECKING, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, NamedTuple, ParamSpec, TypeVar
 
 import numpy as np
 
@@ -91,9 +91,23 @@ def imu(raw: bytes, *, cdr: bool) -> tuple[int, bytes]:
     return stamp, values if order == "<" else np.frombuffer(values, ">f8").astype("<f8").tobytes()
 
 
+class Joints(NamedTuple):
+    """Names and positions of a sensor_msgs/JointState; some drivers leave the names out."""
+
+    names: tuple[str, ...]
+    positions: tuple[float, ...]
+
+    def position(self, name: str | None) -> float | None:
+        """Return the position of a joint, None without it; no name means the first joint."""
+        if name is None:
+            return self.positions[0]
+        index = self.names.index(name) if name in self.names else len(self.positions)
+        return self.positions[index] if index < len(self.positions) else None
+
+
 @broken_if_malformed
-def joint_position(raw: bytes, *, cdr: bool) -> tuple[int, float]:
-    """Return stamp and position[0] of a sensor_msgs/JointState."""
+def joints(raw: bytes, *, cdr: bool) -> tuple[int, Joints]:
+    """Return stamp and joints, at least one, of a sensor_msgs/JointState."""
     stamp, position, order = header(raw, cdr=cdr)
     position = align(position, 4, cdr=cdr)
     (n_names,) = struct.unpack_from(f"{order}I", raw, position)
@@ -101,14 +115,20 @@ def joint_position(raw: bytes, *, cdr: bool) -> tuple[int, float]:
     if 4 * n_names > len(raw):
         msg = f"{n_names} names in {len(raw)} bytes"
         raise ValueError(msg)
+    names = []
     for _ in range(n_names):
         position = align(position, 4, cdr=cdr)
         (size,) = struct.unpack_from(f"{order}I", raw, position)
+        text = raw[position + 4 : position + 4 + size]
+        names.append(text.rstrip(b"\0").decode("utf-8", "replace"))  # CDR counts a final zero
         position += 4 + size
     position = align(position, 4, cdr=cdr)
     (count,) = struct.unpack_from(f"{order}I", raw, position)
     if count == 0:
         msg = "no position"
         raise ValueError(msg)
-    (angle,) = struct.unpack_from(f"{order}d", raw, align(position + 4, 8, cdr=cdr))
-    return stamp, angle
+    position = align(position + 4, 8, cdr=cdr)
+    if 8 * count > len(raw):
+        msg = f"{count} positions in {len(raw)} bytes"
+        raise ValueError(msg)
+    return stamp, Joints(tuple(names), struct.unpack_from(f"{order}{count}d", raw, position))

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from bentwing.recording.messages.wire_packets import Packet
     from bentwing.recording.packets.clock import ClockReading
     from bentwing.recording.packets.sensors import StampedPackets
-    from bentwing.recording.payload import Lidar
+    from bentwing.recording.sections.lidar import Lidar
 
 N_PEEKED = 200  # packets, a tenth to a third of a second of most lidars
 

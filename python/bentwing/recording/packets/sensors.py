@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from bentwing.recording.batches import LidarBatch
     from bentwing.recording.containers.scanned import TopicInfo
     from bentwing.recording.containers.source import Source
-    from bentwing.recording.payload import Lidar
+    from bentwing.recording.sections.lidar import Lidar
 
 OUSTER_VERSION = "0.16.2"  # the newest whose wheels hold nothing but free software
 

@@ -22,15 +22,20 @@ if TYPE_CHECKING:
     from bentwing.recording.containers.scanned import TopicInfo
     from bentwing.recording.packets.clock import PacketClock
     from bentwing.recording.packets.sensors import ImuPackets, LidarPackets, StampedPackets
+    from bentwing.recording.readings import ImuReading, LidarReading
     from bentwing.recording.streams import RawMessage
 
 
 class _PacketReader:
     """The packets of a topic that can be used, with their stamps."""
 
-    def __init__(self, topic: TopicInfo, packet_clock: PacketClock, *, cdr: bool) -> None:
+    def __init__(
+        self, topic: TopicInfo, packet_clock: PacketClock, offset_ns: int, *, cdr: bool
+    ) -> None:
         self.counts: Counter[str] = Counter()
-        self.monitor = StampMonitor(topic.name, use_recorder_time=False, counts=self.counts)
+        self.monitor = StampMonitor(
+            topic.name, use_recorder_time=False, counts=self.counts, offset_ns=offset_ns
+        )
         self._kind, self._cdr = topic.type, cdr
         self._packet_clock = packet_clock
 
@@ -52,8 +57,9 @@ class _PacketReader:
                     continue
                 if leads:
                     self._packet_clock.observe(sensor_ns, host_ns)
-                stamp_ns = self._packet_clock.stamp_ns(sensor_ns, host_ns)
-                if self.monitor.accept(stamp_ns, host_ns) is not None:
+                found_ns = self._packet_clock.stamp_ns(sensor_ns, host_ns)
+                stamp_ns = self.monitor.accept(found_ns, host_ns)
+                if stamp_ns is not None:
                     yield stamp_ns, packet
 
 
@@ -66,12 +72,13 @@ class PacketLidarStream:
         clock: Clock,
         decoder: LidarPackets,
         packet_clock: PacketClock,
+        reading: LidarReading,
         *,
         cdr: bool,
     ) -> None:
-        self._reader = _PacketReader(topic, packet_clock, cdr=cdr)
+        self._reader = _PacketReader(topic, packet_clock, reading.offset_ns, cdr=cdr)
         self.counts, self.monitor = self._reader.counts, self._reader.monitor
-        self._clock, self._decoder = clock, decoder
+        self._clock, self._decoder, self._reading = clock, decoder, reading
         self._merger = SweepMerger(self.counts)
 
     def decode(self, messages: Sequence[RawMessage]) -> LidarBatch | None:
@@ -82,7 +89,8 @@ class PacketLidarStream:
         self.counts["packets"] += len(found)
         stamps_ns, packets = zip(*found, strict=True)
         times = self._clock.to_seconds(np.array(stamps_ns, dtype=np.int64))
-        return self._merger.push([self._decoder.points(packets, times, self.counts)])
+        batch = self._decoder.points(packets, times, self.counts)
+        return self._merger.push([self._reading.batch(batch)])
 
     def finish(self) -> LidarBatch | None:
         """Return the points held back for packets that overlap."""
@@ -98,12 +106,13 @@ class PacketImuStream:
         clock: Clock,
         decoder: ImuPackets,
         packet_clock: PacketClock,
+        reading: ImuReading,
         *,
         cdr: bool,
     ) -> None:
-        self._reader = _PacketReader(topic, packet_clock, cdr=cdr)
+        self._reader = _PacketReader(topic, packet_clock, reading.offset_ns, cdr=cdr)
         self.counts, self.monitor = self._reader.counts, self._reader.monitor
-        self._clock, self._decoder = clock, decoder
+        self._clock, self._decoder, self._reading = clock, decoder, reading
 
     def decode(self, messages: Sequence[RawMessage]) -> ImuBatch | None:
         """Return the samples of the next messages."""
@@ -116,7 +125,8 @@ class PacketImuStream:
         if not stamps:
             return None
         times = self._clock.to_seconds(np.concatenate(stamps))
-        gyro, accel = np.concatenate(gyros), np.concatenate(accels)
+        gyro = self._reading.gyro.vectors(np.concatenate(gyros))
+        accel = self._reading.accel.vectors(np.concatenate(accels))
         self.counts["samples"] += len(times)
         keep = usable_samples(gyro, accel, self.counts)
         return ImuBatch(times[keep], gyro[keep], accel[keep]) if keep.any() else None

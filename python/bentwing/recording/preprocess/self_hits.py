@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from bentwing.recording.payload import SelfHit
+    from bentwing.recording.sections.self_hits import SelfHit
 
 
 def outside_boxes(points: NDArray[np.float64], self_hits: Iterable[SelfHit]) -> NDArray[np.bool_]:

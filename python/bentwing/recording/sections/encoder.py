@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""The section `encoder`."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field, field_validator
+
+from bentwing.recording.sections.section import (
+    Angle,
+    ClockOffset,
+    Offset,
+    Section,
+    Topic,
+    Transform,
+    Vector,
+)
+
+AngleUnit = Literal["rad", "deg"]
+
+
+class Encoder(Section):
+    """The motor that turns the lidar, whose encoder reads θ.
+
+    `T_imu_lidar(θ) = T_imu_motor · Rot(axis, θ + zero) · T_motor_lidar`
+
+    Attributes
+    ----------
+    topic : None for the only JointState topic in the recording
+    joint : which joint of the messages it is; None: the first
+    unit : of the positions in the recording, rad or deg
+    sign : 1, or -1 where the positions grow against the turn of `axis`
+    clock_offset : s, added to its stamps before all else: for a clock that counts from power-on
+    axis : unit vector in the motor frame, normalized on entry
+    zero : rad, added to the encoder's angle
+    T_imu_motor : pose of the motor in the IMU frame
+    T_motor_lidar : pose of the lidar in the frame that the motor turns
+    delay : s, at a stamp of the lidar the angle is the encoder's of this much earlier
+    """
+
+    topic: Topic | None = None
+    joint: Annotated[str, Field(min_length=1)] | None = None
+    unit: AngleUnit = "rad"
+    sign: Literal[1, -1] = 1
+    clock_offset: ClockOffset = 0.0
+    axis: Vector = (0.0, 0.0, 1.0)
+    zero: Angle = 0.0
+    T_imu_motor: Transform = Transform()
+    T_motor_lidar: Transform = Transform()
+    delay: Offset = 0.0
+
+    @field_validator("axis")
+    @classmethod
+    def _unit_axis(cls, value: Vector) -> Vector:
+        norm = float(np.linalg.norm(value))
+        if norm < 1e-6:
+            msg = f"has length {norm:.3g}: give the direction of the motor's axis"
+            raise ValueError(msg)
+        if abs(norm - 1.0) < 1e-15:
+            return value
+        x, y, z = (component / norm for component in value)
+        return x, y, z

@@ -1,0 +1,26 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""The section `gnss`."""
+
+from __future__ import annotations
+
+from pydantic import field_validator
+
+from bentwing.recording.sections.section import Section, Topic, Vector, require_lever
+
+
+class Gnss(Section):
+    """GNSS fixes (NavSatFix), used only when named.
+
+    Attributes
+    ----------
+    topic : of the fixes
+    lever_arm : m, phase centre of the antenna in the IMU frame
+    """
+
+    topic: Topic
+    lever_arm: Vector = (0.0, 0.0, 0.0)
+
+    @field_validator("lever_arm")
+    @classmethod
+    def _plausible_lever(cls, value: Vector) -> Vector:
+        return require_lever(value)

@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""The section `lidar`."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, get_args
+
+from pydantic import Field, ValidationInfo, field_validator, model_validator
+
+from bentwing.recording.lidar_kinds import KIND_DEFAULTS, LidarKind, VelodyneModel
+from bentwing.recording.sections.section import NonNegative, Offset, Positive, Section, Topic
+
+# s; what is beyond is taken off the stamps when they are read. An estimator follows a latency from
+# where it starts, but holds inertial samples for 50 ms beyond the newest point only.
+MAX_ESTIMATED_LATENCY = 0.01
+
+
+class Lidar(Section):
+    """The lidar.
+
+    Attributes
+    ----------
+    topic : None for the only topic of a lidar type in the recording
+    kind : decides the defaults of ranges and noise
+    model : of a Velodyne, where its raw packets do not identify it
+    metadata : JSON file of an Ouster, relative to the payload file, where the recording has none
+    min_range, max_range : m, closest and farthest return that is kept; default: by `kind`
+    range_sigma : m, one standard deviation of a range; default: by `kind`
+    latency : s, its stamps minus the IMU's clock; estimators start from it
+    mirrored : its scans run the other way: y of every point is negated
+    range_scale : m per unit of the ranges in the recording; 0.001 for millimetres
+    """
+
+    topic: Topic | None = None
+    kind: LidarKind = "generic"
+    model: VelodyneModel | None = None
+    metadata: Annotated[str, Field(min_length=1)] | None = None
+    min_range: NonNegative = 0.0
+    max_range: Positive = 0.0
+    range_sigma: Positive = 0.0
+    latency: Offset = 0.0
+    mirrored: bool = False
+    range_scale: Positive = 1.0
+
+    @model_validator(mode="before")
+    @classmethod
+    def _defaults_by_kind(cls, data: Any) -> Any:  # noqa: ANN401 - before validation
+        if not isinstance(data, dict):
+            return data
+        kind = data.get("kind", "generic")
+        # An unknown kind is reported by its own field.
+        defaults = KIND_DEFAULTS[kind if kind in get_args(LidarKind) else "generic"]
+        names = ("min_range", "max_range", "range_sigma")
+        return {name: getattr(defaults, name) for name in names} | data
+
+    @field_validator("metadata")
+    @classmethod
+    def _beside_payload(cls, value: str | None, info: ValidationInfo) -> str | None:
+        folder = (info.context or {}).get("folder")
+        return value if value is None or folder is None else str(folder / value)
+
+    @model_validator(mode="after")
+    def _ordered_ranges(self) -> Lidar:
+        if self.min_range >= self.max_range:
+            msg = f"min_range {self.min_range:g} m must be below max_range {self.max_range:g} m"
+            raise ValueError(msg)
+        return self
+
+    @property
+    def latency_read(self) -> float:
+        """The latency that is taken off the stamps when they are read, s: all of a large one."""
+        return self.latency if abs(self.latency) > MAX_ESTIMATED_LATENCY else 0.0
+
+    @property
+    def latency_left(self) -> float:
+        """The latency that estimators start from, s: of stamps as they are read."""
+        return self.latency - self.latency_read

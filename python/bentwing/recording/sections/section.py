@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""What all sections of payload.yaml have in common: their base, their numbers, and transforms."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, field_validator
+
+from bentwing.base.mount import Pose
+
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Vector = tuple[Finite, Finite, Finite]
+Quaternion = tuple[Finite, Finite, Finite, Finite]
+Offset = Annotated[float, Field(ge=-1.5, le=1.5, allow_inf_nan=False)]  # s, between two clocks
+# s between a clock that counts from anywhere and the epoch; beyond it int64 nanoseconds end.
+ClockOffset = Annotated[float, Field(ge=-4e9, le=4e9, allow_inf_nan=False)]
+Angle = Annotated[float, Field(ge=-2 * np.pi, le=2 * np.pi, allow_inf_nan=False)]  # rad
+Topic = Annotated[str, Field(min_length=1)]
+
+MAX_LEVER = 10.0  # m; a sensor farther away on the same carrier is a mistake of units
+QUATERNION_TOLERANCE = 1e-3  # rounding to three digits is repaired, anything worse is refused
+
+
+class Section(BaseModel):
+    """A part of payload.yaml: frozen, and without keys that it does not know."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+def require_lever(value: Vector) -> Vector:
+    """Refuse an offset between sensors that no carrier has."""
+    distance = float(np.linalg.norm(value))
+    if distance > MAX_LEVER:
+        msg = f"is {distance:.4g} m long, more than {MAX_LEVER:g} m: give it in metres"
+        raise ValueError(msg)
+    return value
+
+
+class Transform(Section):
+    """Rigid transform.
+
+    Attributes
+    ----------
+    translation : m
+    quaternion : x y z w, normalized on entry
+    """
+
+    translation: Vector = (0.0, 0.0, 0.0)
+    quaternion: Quaternion = (0.0, 0.0, 0.0, 1.0)
+
+    @field_validator("translation")
+    @classmethod
+    def _plausible_lever(cls, value: Vector) -> Vector:
+        return require_lever(value)
+
+    @field_validator("quaternion")
+    @classmethod
+    def _normalized(cls, value: Quaternion) -> Quaternion:
+        norm = float(np.linalg.norm(value))
+        if not abs(norm - 1.0) <= QUATERNION_TOLERANCE:
+            msg = f"has norm {norm:.4g}, expected 1: give a unit quaternion in the order x y z w"
+            raise ValueError(msg)
+        # Leave quaternions that are unit up to rounding alone, so that a payload written out and
+        # read again is the same value.
+        if abs(norm - 1.0) < 1e-15:
+            return value
+        x, y, z, w = (component / norm for component in value)
+        return x, y, z, w
+
+    @property
+    def pose(self) -> Pose:
+        """The transform as arrays."""
+        return Pose(np.array(self.translation), np.array(self.quaternion))

@@ -22,6 +22,7 @@ import bentwing
 from bentwing import Trajectory, read_tum
 from bentwing.evaluate import absolute_error
 from bentwing.odometry import ContinuousSettings
+from bentwing.recording import LidarBatch
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -90,14 +91,11 @@ def parts(batch: Batch) -> list[tuple[np.ndarray, ...]]:
 
 def add(odometry: bentwing.Odometry, batch: Batch, part: tuple[np.ndarray, ...]) -> bool:
     """Feed one piece; returns whether it was points."""
-    kind = type(batch).__name__
-    if kind == "LidarBatch":
-        odometry.add_points(part[1], part[0])
-    elif kind == "ImuBatch":
-        odometry.add_imu(*part)
-    else:
-        odometry.add_encoder(*part)
-    return kind == "LidarBatch"
+    if isinstance(batch, LidarBatch):
+        odometry.feed(LidarBatch(part[1], part[0]))
+        return True
+    odometry.feed(type(batch)(*part))
+    return False
 
 
 class Viewer:

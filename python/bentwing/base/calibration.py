@@ -57,6 +57,7 @@ class Calibration(Value):
         """Return the calibration as run.json has it; the mount as payload.yaml does."""
         return {
             "latency": self.source_latency,
+            "latency_left": self.latency,  # a sum would lose its last digits
             "latency_read": self.latency_read,
             "mount": self.mount.to_json(),
             **{name: getattr(self, name).tolist() for name in _VECTORS},
@@ -68,6 +69,6 @@ class Calibration(Value):
         """Read the calibration in a run.json, of earlier versions as well."""
         vectors = {name: np.array(described[name], float) for name in _VECTORS}
         mount = mount_from_json(described["mount"])
+        latency = described.get("latency_left", described["latency"])
         read = described.get("latency_read", 0.0)
-        latency = described["latency"] - read
         return cls(latency, mount, **vectors, std=described["std"], latency_read=read)

@@ -185,8 +185,9 @@ def _scan_turns(recording: Recording) -> ScanTurns | None:
 def _mirrored(recording: Recording) -> str:
     return (
         f"{recording.imu_topic}: the gyro turns against the scans of {recording.lidar_topic} about "
-        "the scan plane's normal, so one axis is mirrored; flip the sign of the gyro's axis along "
-        "the normal in the driver, or, if the lidar is mounted upside down, say so in T_imu_lidar"
+        "the scan plane's normal, so one axis is mirrored; say in the payload which: T_imu_lidar if the "
+        "lidar is mounted upside down, 'lidar: {mirrored: true}' if its scans run the other way, or "
+        "the gyro's axis along the normal in imu.gyro_axes"
     )
 
 

@@ -91,6 +91,11 @@ def test_a_payload_written_and_read_again_is_the_same(tmp_path, data):
     path = tmp_path / "payload.yaml"
     path.write_text(yaml.safe_dump(payload.model_dump(mode="json")), encoding="utf-8")
     assert Payload.load(path) == payload
+    payload.save(path)
+    read = Payload.load(path)
+    assert read == payload
+    assert read.describes_imu == payload.describes_imu
+    assert read.to_yaml() == payload.to_yaml()
 
 
 @given(content=st.binary(max_size=200) | st.text(max_size=200).map(str.encode))

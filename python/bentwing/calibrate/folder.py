@@ -5,9 +5,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import yaml
-
-from bentwing.base.atomic import write_text
 from bentwing.base.result_folder import RecordedFolder, ResultFolder
 from bentwing.calibrate.outcome import as_record
 
@@ -29,8 +26,5 @@ class CalibrationFolder(ResultFolder):
 
     def finish(self, found: Calibrated, inputs: Iterable[Path]) -> None:
         """Write payload.yaml and calibration.json, and remove what is left of an earlier one."""
-        content = found.payload.model_dump(mode="json", exclude_unset=True)
-        write_text(
-            self.file(PAYLOAD), yaml.safe_dump(content, sort_keys=False, default_flow_style=None)
-        )
+        found.payload.save(self.file(PAYLOAD))
         self.complete((path for path in inputs if path.is_file()), as_record(found))

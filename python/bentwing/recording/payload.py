@@ -7,6 +7,7 @@ coordinates in b to coordinates in a; quaternions are Hamilton, x y z w. `sectio
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -14,9 +15,11 @@ import numpy as np
 from pydantic import Field, ValidationError
 
 from bentwing.base.arguments import instance
+from bentwing.base.atomic import write_text
 from bentwing.base.errors import PayloadError
 from bentwing.base.validation import describe
 from bentwing.base.yaml_files import read_yaml
+from bentwing.recording.payload_text import payload_text
 from bentwing.recording.sections.calibration import CalibrationRecord
 from bentwing.recording.sections.encoder import Encoder
 from bentwing.recording.sections.gnss import Gnss
@@ -75,6 +78,20 @@ class Payload(Section):
             return cls.model_validate(data, context={"folder": Path(path).parent})
         except ValidationError as error:
             raise PayloadError(describe(error, cls, path)) from None
+
+    def to_yaml(self) -> str:
+        """Return what `load` reads as the same head: what differs from the defaults, with units."""
+        return payload_text(self)
+
+    def save(self, path: Path | str) -> None:
+        """Write a payload.yaml as a whole or not at all; files that it names are found from there."""
+        file, named = Path(path), self.lidar.metadata
+        if named is not None and not Path(named).is_absolute():
+            beside = os.path.relpath(named, file.parent)
+            lidar = self.lidar.model_copy(update={"metadata": beside})
+            write_text(file, self.model_copy(update={"lidar": lidar}).to_yaml())
+            return
+        write_text(file, self.to_yaml())
 
     @property
     def describes_imu(self) -> bool:

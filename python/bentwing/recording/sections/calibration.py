@@ -7,14 +7,24 @@ from pydantic import Field
 
 from bentwing.recording.sections.section import NonNegative, Section, Vector
 
+STD_UNITS = {
+    "motor_tilt": "rad",
+    "motor_offset": "m",
+    "encoder_delay": "s",
+    "encoder_zero": "rad",
+    "latency": "s",
+    "extrinsic_rotation": "rad",
+    "extrinsic_translation": "m",
+}
+
 
 class CalibrationRecord(Section):
     """How well the values above are known, as `bentwing calibrate` writes it; no estimator reads it.
 
-    `std` are standard deviations by name: `motor_tilt` (rad) and `motor_offset` (m) of the lidar on
-    the motor, about and along the two directions of `motor_across` (motor frame), `encoder_delay`
-    (s), `latency` (s), and of `T_imu_motor` or `T_imu_lidar` `extrinsic_rotation` (rad) and
-    `extrinsic_translation` (m).
+    `std` are standard deviations by name, in the units of `STD_UNITS`: `motor_tilt` and
+    `motor_offset` of the lidar on the motor, about and along the two directions of `motor_across`
+    (motor frame), `encoder_delay`, `encoder_zero`, `latency`, and of `T_imu_motor` or `T_imu_lidar`
+    `extrinsic_rotation` and `extrinsic_translation`.
     """
 
     std: dict[str, tuple[NonNegative, ...]] = Field(default_factory=dict)

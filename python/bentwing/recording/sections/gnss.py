@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from pydantic import field_validator
 
-from bentwing.recording.sections.section import Section, Topic, Vector, require_lever
+from bentwing.recording.sections.section import Lever, Section, Topic, Vector, require_lever
 
 
 class Gnss(Section):
@@ -18,7 +18,7 @@ class Gnss(Section):
     """
 
     topic: Topic
-    lever_arm: Vector = (0.0, 0.0, 0.0)
+    lever_arm: Lever = (0.0, 0.0, 0.0)
 
     @field_validator("lever_arm")
     @classmethod

@@ -7,6 +7,7 @@ from typing import Annotated, Literal, get_args
 
 from pydantic import BeforeValidator, field_validator
 
+from bentwing.base.units import Unit
 from bentwing.recording.sections.section import ClockOffset, Positive, Section, Topic
 
 Axis = Literal["x", "-x", "y", "-y", "z", "-z"]
@@ -51,10 +52,10 @@ class Imu(Section):
     """
 
     topic: Topic | None = None
-    gyro_noise: Positive = 5.0e-4
-    accel_noise: Positive = 8.0e-4
-    gyro_bias_walk: Positive = 1.0e-5
-    accel_bias_walk: Positive = 1.0e-4
+    gyro_noise: Annotated[Positive, Unit("rad/s/√Hz")] = 5.0e-4
+    accel_noise: Annotated[Positive, Unit("m/s²/√Hz")] = 8.0e-4
+    gyro_bias_walk: Annotated[Positive, Unit("rad/s²/√Hz")] = 1.0e-5
+    accel_bias_walk: Annotated[Positive, Unit("m/s³/√Hz")] = 1.0e-4
     axes: Axes = AS_GIVEN
     gyro_axes: Axes | None = None
     units: ImuUnits = ImuUnits()

@@ -3,10 +3,12 @@
 
 from __future__ import annotations
 
+import os
 from typing import Annotated, Any, get_args
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
+from bentwing.base.units import Unit
 from bentwing.recording.lidar_kinds import KIND_DEFAULTS, LidarKind, VelodyneModel
 from bentwing.recording.sections.section import NonNegative, Offset, Positive, Section, Topic
 
@@ -35,12 +37,12 @@ class Lidar(Section):
     kind: LidarKind = "generic"
     model: VelodyneModel | None = None
     metadata: Annotated[str, Field(min_length=1)] | None = None
-    min_range: NonNegative = 0.0
-    max_range: Positive = 0.0
-    range_sigma: Positive = 0.0
+    min_range: Annotated[NonNegative, Unit("m")] = 0.0
+    max_range: Annotated[Positive, Unit("m")] = 0.0
+    range_sigma: Annotated[Positive, Unit("m, one standard deviation")] = 0.0
     latency: Offset = 0.0
     mirrored: bool = False
-    range_scale: Positive = 1.0
+    range_scale: Annotated[Positive, Unit("m per unit of the recording")] = 1.0
 
     @model_validator(mode="before")
     @classmethod
@@ -57,7 +59,7 @@ class Lidar(Section):
     @classmethod
     def _beside_payload(cls, value: str | None, info: ValidationInfo) -> str | None:
         folder = (info.context or {}).get("folder")
-        return value if value is None or folder is None else str(folder / value)
+        return value if value is None or folder is None else os.path.normpath(folder / value)
 
     @model_validator(mode="after")
     def _ordered_ranges(self) -> Lidar:
@@ -65,6 +67,12 @@ class Lidar(Section):
             msg = f"min_range {self.min_range:g} m must be below max_range {self.max_range:g} m"
             raise ValueError(msg)
         return self
+
+    def differing(self) -> dict[str, Any]:
+        """Return the fields that differ from the defaults of this kind."""
+        of_kind = type(self).model_validate({"kind": self.kind})
+        defaults = dict(of_kind) | {"kind": "generic"}
+        return {name: value for name, value in self if value != defaults[name]}
 
     @property
     def latency_read(self) -> float:

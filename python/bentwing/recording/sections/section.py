@@ -3,22 +3,24 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from bentwing.base.mount import Pose
+from bentwing.base.units import Unit
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Vector = tuple[Finite, Finite, Finite]
 Quaternion = tuple[Finite, Finite, Finite, Finite]
-Offset = Annotated[float, Field(ge=-1.5, le=1.5, allow_inf_nan=False)]  # s, between two clocks
-# s between a clock that counts from anywhere and the epoch; beyond it int64 nanoseconds end.
-ClockOffset = Annotated[float, Field(ge=-4e9, le=4e9, allow_inf_nan=False)]
-Angle = Annotated[float, Field(ge=-2 * np.pi, le=2 * np.pi, allow_inf_nan=False)]  # rad
+Offset = Annotated[float, Field(ge=-1.5, le=1.5, allow_inf_nan=False), Unit("s")]
+# Between a clock that counts from anywhere and the epoch; beyond it int64 nanoseconds end.
+ClockOffset = Annotated[float, Field(ge=-4e9, le=4e9, allow_inf_nan=False), Unit("s")]
+Angle = Annotated[float, Field(ge=-2 * np.pi, le=2 * np.pi, allow_inf_nan=False), Unit("rad")]
+Lever = Annotated[Vector, Unit("m")]
 Topic = Annotated[str, Field(min_length=1)]
 
 MAX_LEVER = 10.0  # m; a sensor farther away on the same carrier is a mistake of units
@@ -29,6 +31,16 @@ class Section(BaseModel):
     """A part of payload.yaml: frozen, and without keys that it does not know."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
+
+    def differing(self) -> dict[str, Any]:
+        """Return the fields that differ from their defaults, and the sections that were given."""
+        fields = type(self).model_fields
+        return {
+            name: value
+            for name, value in self
+            if value != fields[name].get_default(call_default_factory=True)
+            or (name in self.model_fields_set and isinstance(value, Section))
+        }
 
 
 def require_lever(value: Vector) -> Vector:
@@ -49,8 +61,8 @@ class Transform(Section):
     quaternion : x y z w, normalized on entry
     """
 
-    translation: Vector = (0.0, 0.0, 0.0)
-    quaternion: Quaternion = (0.0, 0.0, 0.0, 1.0)
+    translation: Lever = (0.0, 0.0, 0.0)
+    quaternion: Annotated[Quaternion, Unit("x y z w")] = (0.0, 0.0, 0.0, 1.0)
 
     @field_validator("translation")
     @classmethod

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from pydantic import model_validator
 
-from bentwing.recording.sections.section import Section, Vector
+from bentwing.recording.sections.section import Lever, Section
 
 
 class Box(Section):
@@ -16,8 +16,8 @@ class Box(Section):
     min, max : m, lowest and highest corner x y z
     """
 
-    min: Vector
-    max: Vector
+    min: Lever
+    max: Lever
 
     @model_validator(mode="after")
     def _has_volume(self) -> Box:

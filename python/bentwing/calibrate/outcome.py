@@ -95,7 +95,9 @@ def with_motor(payload: Payload, motor: MotorCalibration) -> Payload:
 
 
 def with_motion(payload: Payload, found: Calibration) -> Payload:
-    """Return the payload with what motion has told."""
+    """Return the payload with what motion has told; without an IMU that is nothing."""
+    if "latency" not in found.std:
+        return payload
     known = payload.calibration or CalibrationRecord()
     names = ["latency", "extrinsic_rotation", "extrinsic_translation"]
     update: dict[str, Any] = {

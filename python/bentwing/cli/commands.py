@@ -18,6 +18,7 @@ COMMANDS = {
     "localize": "Find a recording in a map, and report what has changed.",
     "merge": "Put several runs into one map.",
     "info": "Check whether a recording is fit for mapping.",
+    "payload": "Write a description of the sensor head to start from.",
     "calibrate": "Calibrate a sensor head: motor, IMU and clocks.",
     "plan": "Plan a flight: spin rate, point spacing, coverage.",
     "evaluate": "Measure the errors of a trajectory and a map.",

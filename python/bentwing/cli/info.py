@@ -11,12 +11,17 @@ UNFIT = RecordingError.exit_code
 EXAMPLES = (
     "bentwing info recording.bag",
     "bentwing info recording.bag -p payload.yaml",
+    "bentwing info recording.bag --write-payload payload.yaml",
     "bentwing info part1.bag part2.bag --json",
 )
 
 
 def command(
-    recording: options.Recording, *, payload: options.Payload = None, as_json: options.Json = False
+    recording: options.Recording,
+    *,
+    payload: options.Payload = None,
+    write_payload: options.WritePayload = None,
+    as_json: options.Json = False,
 ) -> int | None:
     """Check a recording: topics, rates, gaps, spin, stalls and visible structure, with a verdict."""
     # slow to import, so only when it is needed
@@ -25,10 +30,14 @@ def command(
 
     from rich.console import Console
 
+    from bentwing.calibrate.draft import draft_payload
     from bentwing.calibrate.inspection import inspect
     from bentwing.cli.info_page import page
 
+    options.require_new_file(write_payload)
     inspection = inspect(recording, payload)
+    if write_payload is not None:
+        draft_payload(recording, payload).save(write_payload)
     if as_json:
         typer.echo(json.dumps({**dataclasses.asdict(inspection), "is_fit": inspection.is_fit}))
     else:

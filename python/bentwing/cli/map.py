@@ -38,6 +38,7 @@ def command(
             options.ESTIMATION, "--no-loop-closure", help="Leave the trajectory open-loop."
         ),
     ] = False,
+    write_payload: options.WritePayload = None,
     threads: options.Threads = None,
     start: options.Start = None,
     duration: options.Duration = None,
@@ -59,7 +60,9 @@ def command(
     one and merged.
     """
     # slow to import, so only when it is needed
+    from bentwing.base.errors import UsageError
     from bentwing.base.progress import create_progress
+    from bentwing.calibrate.outcome import with_motion
     from bentwing.cli.done import say_maps, say_run
     from bentwing.recording.flights import flights_of
     from bentwing.run.choose import choose, given
@@ -82,13 +85,22 @@ def command(
     if print_settings:
         typer.echo(chosen.to_yaml(), nl=False)
         return
+    options.require_new_file(write_payload)
     progress = create_progress(quiet=quiet)
     flights = flights_of(recording) if len(recording) > 1 else [recording]
     if len(flights) > 1:
+        if write_payload is not None:
+            msg = (
+                f"--write-payload with {len(flights)} flights: each finds the head anew; give it with "
+                "one recording"
+            )
+            raise UsageError(msg)
         merged = map_flights(flights, out, chosen, payload, resume=resume, progress=progress)
         if not quiet:
             say_maps(merged)
         return
-    run_recording(recording, out, chosen, payload, resume=resume, progress=progress)
+    found = run_recording(recording, out, chosen, payload, resume=resume, progress=progress)
+    if write_payload is not None and found.estimate is not None:
+        with_motion(chosen.payload, found.estimate.calibration).save(write_payload)
     if not quiet:
         say_run(out)

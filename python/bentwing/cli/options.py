@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
+from bentwing.base.errors import UsageError
 from bentwing.closing.georeference.names import GeoreferenceMode
 from bentwing.map.formats import MapFormat
 from bentwing.odometry.names import EstimatorName
@@ -43,6 +44,23 @@ def payload(**details: Any) -> Any:  # noqa: ANN401 - typer's own
     """Return the option that names the description of the sensor head."""
     help_line = "Description of the sensor head, payload.yaml."
     return option(INPUT, "--payload", "-p", metavar="FILE", help=help_line, **details)
+
+
+def require_new_file(path: Path | None) -> None:
+    """Refuse a file to write that is there already, or that has no folder to be in.
+
+    Raises
+    ------
+    UsageError
+    """
+    if path is None:
+        return
+    if path.exists():
+        msg = f"{path}: exists already; name another file, or move this one away"
+        raise UsageError(msg)
+    if not path.parent.is_dir():
+        msg = f"{path}: there is no folder {path.parent}; make it, or name a file elsewhere"
+        raise UsageError(msg)
 
 
 def cleaning(*, keep_mixed: bool, keep_moving: bool) -> dict[str, bool]:
@@ -147,6 +165,15 @@ ControlPoints = Annotated[
     option(EARTH, metavar="FILE", help="CSV of surveyed points: id,x,y,z,radius[,use]."),
 ]
 
+WritePayload = Annotated[
+    Path | None,
+    option(
+        RESULT,
+        "--write-payload",
+        metavar="FILE",
+        help="Write the sensor head as it was found, as payload.yaml; the file must not exist.",
+    ),
+]
 Force = Annotated[
     bool,
     option(INPUT, "--force", help="Map a recording that `bentwing info` calls unfit."),

@@ -98,16 +98,23 @@ def _one(
     """Return the topic named, or the only one of the preferred types that has messages."""
     if name is not None:
         return _named(topics, role, types, name)
-    groups = [[topic for topic in topics if _plays(topic, role, group)] for group in types]
-    filled = [found for group in groups if (found := [topic for topic in group if topic.count])]
-    candidates = next(iter([*filled, *filter(None, groups)]), [])
-    if len(candidates) > 1:
+    found = candidates(topics, role, types)
+    if len(found) > 1:
         msg = (
-            f"{len(candidates)} topics could be the {role}: {_listed(candidates)}; "
+            f"{len(found)} topics could be the {role}: {_listed(found)}; "
             f"name one in the payload under '{role}: {{topic: ...}}'"
         )
         raise RecordingError(msg)
-    return _filled(candidates[0], role) if candidates else None
+    return _filled(found[0], role) if found else None
+
+
+def candidates(
+    topics: Sequence[TopicInfo], role: str, types: Sequence[Sequence[str]]
+) -> list[TopicInfo]:
+    """Return the topics that could play a part: those of the preferred types that have messages."""
+    groups = [[topic for topic in topics if _plays(topic, role, group)] for group in types]
+    filled = [found for group in groups if (found := [topic for topic in group if topic.count])]
+    return next(iter([*filled, *filter(None, groups)]), [])
 
 
 def _plays(topic: TopicInfo, role: str, types: Sequence[str]) -> bool:

@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""The delay between lidar and IMU from the times at which the head comes back to an attitude.
+
+Where the gyro says that the head has come back to where it pointed shortly before, the lidar must see
+about the same again, wherever it is mounted. So the delay shows without knowing the mount, for a 2D
+lidar as well, whose motion cannot be followed by itself.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bentwing.base import geometry
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from bentwing.calibrate.set_up.stretch import Stretch
+    from bentwing.recording import ImuBatch
+
+N_BEAMS = 120
+STEP = 0.01  # s between scans that are compared, at most the scan rate
+SHORTEST, LONGEST = 0.1, 2.0  # s until the head comes back
+LARGEST_DELAY = 3.0  # s
+BACK, AWAY = np.radians(4.0), np.radians(20.0)
+MOST_DIFFERENT = 0.5  # of the logarithm of a range: what comes into view counts no more
+FEWEST = 100
+# The right delay must stand out by this share of the usual difference from all others.
+STANDS_OUT, NEARBY = 0.3, 0.15  # -, s
+
+
+def delay_by_returns(stretch: Stretch, imu: ImuBatch) -> float | None:
+    """Return lidar stamps minus IMU clock, s; None where the motion does not tell.
+
+    Parameters
+    ----------
+    imu : rates in rad/s
+    """
+    scans = _Scans(stretch)
+    if len(scans.times) < FEWEST or len(imu.times) < FEWEST:
+        return None
+    first, later = _pairs(scans.times, imu)
+    if len(first) < FEWEST:
+        return None
+    steps = round(LARGEST_DELAY / scans.interval)
+    delays = np.arange(-steps, steps + 1)
+    costs = np.array([scans.difference(first + delay, later + delay) for delay in delays])
+    if np.isfinite(costs).sum() < len(costs) // 4:
+        return None
+    best = int(np.nanargmin(costs))
+    others = costs[np.abs(delays - delays[best]) * scans.interval > NEARBY]
+    depth = float(np.nanmedian(costs)) - costs[best]
+    if np.nanmin(others) - costs[best] < STANDS_OUT * depth:
+        return None
+    return float(delays[best] * scans.interval)
+
+
+class _Scans:
+    """Ranges by direction, for each scan.
+
+    Attributes
+    ----------
+    times : (S,) s, middle of each scan, evenly spaced by `interval`
+    """
+
+    def __init__(self, stretch: Stretch) -> None:
+        points = np.concatenate([b.points for b in stretch.lidar])
+        times = np.concatenate([b.times for b in stretch.lidar])
+        azimuths = np.arctan2(points[:, 1], points[:, 0])
+        starts = np.concatenate([[0], np.flatnonzero(np.abs(np.diff(azimuths)) > 1.0) + 1])
+        ranges = np.log(np.maximum(np.linalg.norm(points, axis=1), 1e-3))
+        beams = np.floor((azimuths / (2 * np.pi) + 0.5) * N_BEAMS).astype(np.int64) % N_BEAMS
+        rows = np.repeat(np.arange(len(starts)), np.diff([*starts, len(times)]))
+        profiles = np.full((len(starts), N_BEAMS), np.nan, np.float32)
+        profiles[rows, beams] = ranges
+        middles = np.add.reduceat(times, starts) / np.diff([*starts, len(times)])
+        self.interval = max(STEP, float(np.median(np.diff(middles)))) if len(middles) > 1 else STEP
+        self.times = np.arange(middles[0], middles[-1], self.interval)
+        nearest = np.clip(np.searchsorted(middles, self.times), 0, len(middles) - 1)
+        self._profiles = profiles[nearest]
+        width = round(LONGEST / self.interval)
+        self._differences = np.full((len(self.times), width), np.nan, np.float32)
+        for lag in range(1, min(width, len(self.times))):
+            apart = np.abs(self._profiles[lag:] - self._profiles[:-lag])
+            seen = np.isfinite(apart)
+            total = np.where(seen, np.minimum(apart, MOST_DIFFERENT), 0.0).sum(axis=1)
+            count = seen.sum(axis=1)
+            self._differences[:-lag, lag] = np.where(count > N_BEAMS // 6, total / np.maximum(count, 1), np.nan)
+        usual = np.where(np.isfinite(self._differences), self._differences, 0.0).sum(axis=1)
+        number = np.isfinite(self._differences).sum(axis=1)
+        self._usual = np.where(number > 0, usual / np.maximum(number, 1), np.nan)
+
+    def difference(self, first: NDArray[np.intp], later: NDArray[np.intp]) -> float:
+        """Return how much scans differ from later ones (K,), in units of what is usual there."""
+        inside = (first >= 0) & (later < len(self.times))
+        if inside.sum() < FEWEST:
+            return float("nan")
+        apart = self._differences[first[inside], (later - first)[inside]]
+        usual = self._usual[first[inside]]
+        known = np.isfinite(apart) & np.isfinite(usual)
+        if known.sum() < FEWEST:
+            return float("nan")
+        return float(apart[known].mean() / usual[known].mean())
+
+
+def _pairs(
+    times: NDArray[np.float64], imu: ImuBatch
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return the numbers of times (S,) between which the head turned away and came back."""
+    quats = _attitudes(times, imu)
+    inside = np.flatnonzero((times >= imu.times[0]) & (times <= imu.times[-1]))
+    if len(inside) < 2:
+        return np.zeros(0, np.intp), np.zeros(0, np.intp)
+    low, high = inside[0], inside[-1] + 1
+    interval = float(times[1] - times[0])
+    found: list[tuple[NDArray[np.intp], NDArray[np.intp]]] = []
+    for lag in range(round(SHORTEST / interval), min(round(LONGEST / interval), high - low)):
+        first = np.arange(low, high - lag)
+        is_back = _angle(quats[first], quats[first + lag]) < BACK
+        was_away = _angle(quats[first], quats[first + lag // 2]) > AWAY
+        chosen = first[is_back & was_away]
+        found.append((chosen, chosen + lag))
+    first, later = (np.concatenate(part) for part in zip(*found, strict=True))
+    return first, later
+
+
+def _attitudes(times: NDArray[np.float64], imu: ImuBatch) -> NDArray[np.float64]:
+    """Return the attitude (S, 4) at times (S,) by the gyro alone."""
+    mid = (imu.gyro[1:] + imu.gyro[:-1]) / 2 * np.diff(imu.times)[:, None]
+    quats = np.vstack([[0.0, 0.0, 0.0, 1.0], geometry.exp(mid)])
+    width = 1
+    while width < len(quats):  # products of all that came before, by doubling
+        quats[width:] = geometry.multiply(quats[:-width], quats[width:])
+        width *= 2
+    nearest = np.clip(np.searchsorted(imu.times, times), 0, len(quats) - 1)
+    return np.asarray(quats[nearest])
+
+
+def _angle(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the angles (K,) between attitudes (K, 4), rad."""
+    cosine = np.minimum(np.abs((a * b).sum(axis=1)), 1.0)
+    return np.asarray(2.0 * np.arccos(cosine))

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 CHECKED = 60.0  # s of the recording's beginning; more would not change the judgement
 MIN_SAMPLES = 20
+QUIET, NO_GRAVITY = 1.0, 0.25  # s; m/s² or g
 MAX_RATE = 35.0  # rad/s, full scale of the fastest common gyros
 # m/s², median length; 0.3 m off the axis of a spin of 15 rad/s it is seven times gravity.
 ACCEL_RANGE = (4.0, 250.0)
@@ -40,6 +41,7 @@ WINDOW = 0.3  # s over which the turn of gravity and of the gyro are compared
 # A reading is believed where it explains half of gravity's turning and four times better than
 # the samples as they are.
 EXPLAINS, BETTER = 0.5, 0.25
+_AS_THEY_ARE = np.eye(3)
 
 
 def collect(
@@ -72,7 +74,7 @@ def problems(
     """
     if len(times) < MIN_SAMPLES:
         return []
-    found = [_accel_problem(accel), _gyro_problem(times, gyro, accel)]
+    found = [_accel_problem(times, accel), _gyro_problem(times, gyro, accel)]
     return [problem for problem in found if problem is not None]
 
 
@@ -80,10 +82,29 @@ def in_si(
     times: NDArray[np.float64], gyro: NDArray[np.float64], accel: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return gyro in rad/s and accel in m/s², as far as their units are known."""
-    length = float(np.median(np.linalg.norm(accel, axis=1))) if len(accel) else 0.0
-    units = [unit for unit, (low, high) in ACCEL_UNITS if low <= length < high]
-    factor = ACCEL_FACTORS[units[0]] if units else 1.0
+    factor = ACCEL_FACTORS[accel_unit(accel) or "m/s2"]
     return gyro * gyro_scale(times, gyro, accel), accel * factor
+
+
+def accel_unit(accel: NDArray[np.float64]) -> AccelUnit | None:
+    """Return the unit of accelerations (M, 3) by their median length; None if it is that of none."""
+    length = float(np.median(np.linalg.norm(accel, axis=1))) if len(accel) else 0.0
+    if ACCEL_RANGE[0] <= length <= ACCEL_RANGE[1]:
+        return "m/s2"
+    return next((unit for unit, (low, high) in ACCEL_UNITS if low <= length < high), None)
+
+
+def lacks_gravity(times: NDArray[np.float64], accel: NDArray[np.float64]) -> bool:
+    """Whether the driver has taken gravity off accelerations (M, 3), m/s² or g.
+
+    In either unit an accelerometer shows about one and more at its quietest, without gravity nothing.
+    """
+    n = max(1, int(QUIET / max(float(np.median(np.diff(times))), 1e-6)))
+    if len(accel) < n:
+        return False
+    totals = np.vstack([np.zeros(3), np.cumsum(accel, axis=0)])
+    means = np.linalg.norm(totals[n:] - totals[:-n], axis=1) / n
+    return bool(0.0 < np.median(np.linalg.norm(accel, axis=1)) and means.min() < NO_GRAVITY)
 
 
 def gyro_scale(
@@ -93,15 +114,20 @@ def gyro_scale(
     if len(times) < MIN_SAMPLES:
         return 1.0
     is_fast = _fast_rate(gyro) > MAX_RATE
-    return DEGREE if is_fast or _GravityWindows(times, gyro, accel).explained_by(DEGREE) else 1.0
+    return DEGREE if is_fast or GravityWindows(times, gyro, accel).explained_by(DEGREE) else 1.0
 
 
 def _fast_rate(gyro: NDArray[np.float64]) -> float:
     return float(np.percentile(np.linalg.norm(gyro, axis=1), 99))
 
 
-def _accel_problem(accel: NDArray[np.float64]) -> str | None:
+def _accel_problem(times: NDArray[np.float64], accel: NDArray[np.float64]) -> str | None:
     length = float(np.median(np.linalg.norm(accel, axis=1)))
+    if lacks_gravity(times, accel):
+        return (
+            f"the accelerations lack gravity (median length {length:.2g}, expected 9.8 m/s²), which the "
+            "driver takes off; let it give the raw accelerations, without gravity nothing says what is up"
+        )
     if ACCEL_RANGE[0] <= length <= ACCEL_RANGE[1]:
         return None
     if length == 0.0:
@@ -129,7 +155,7 @@ def _gyro_problem(
             f"the angular rates are in deg/s (up to {fast:.4g}, no common gyro measures beyond "
             f"{MAX_RATE:g} rad/s); {repair}"
         )
-    windows = _GravityWindows(times, gyro, accel)
+    windows = GravityWindows(times, gyro, accel)
     if windows.explained_by(DEGREE):
         return f"the angular rates are in deg/s (gravity turns as slowly in the accelerations); {repair}"
     return None
@@ -149,15 +175,15 @@ def mirrored_axis(
     """
     if len(times) < MIN_SAMPLES:
         return None
-    windows = _GravityWindows(times, gyro, accel)
+    windows = GravityWindows(times, gyro, accel)
     mirrored = [
-        axes
-        for axes in itertools.product((1.0, -1.0), repeat=3)
-        if -1.0 in axes and windows.explained_by(1.0, axes)
+        signs
+        for signs in itertools.product((1.0, -1.0), repeat=3)
+        if -1.0 in signs and windows.explained_by(1.0, np.diag(signs))
     ]
     if not mirrored:
         return None
-    best = min(mirrored, key=lambda axes: windows.residual(1.0, axes))
+    best = min(mirrored, key=lambda signs: windows.residual(1.0, np.diag(signs)))
     names = " and ".join(name for name, sign in zip("xyz", best, strict=True) if sign < 0)
     return (
         f"gyro and accelerometer seem to disagree about the direction of axis {names}; if the head "
@@ -166,7 +192,7 @@ def mirrored_axis(
     )
 
 
-class _GravityWindows:
+class GravityWindows:
     """Short windows with the direction of gravity at both ends and the gyro between.
 
     `starts`, `ends`: (W, 3) unit vectors, imu frame; `steps`: (K, W, 3) rotation vectors of the
@@ -192,16 +218,22 @@ class _GravityWindows:
         self.steps = mid_rates[first[None, :] + np.arange(n_window)[:, None]]
         self.at_rest, self.as_they_are = self.residual(0.0), self.residual(1.0)
 
-    def residual(self, scale: float, signs: tuple[float, ...] = (1.0, 1.0, 1.0)) -> float:
-        """Return the sum of squared differences between gravity as measured and as turned."""
+    def residual(self, scale: float, axes: NDArray[np.float64] = _AS_THEY_ARE) -> float:
+        """Return the sum of squared differences between gravity as measured and as turned.
+
+        Parameters
+        ----------
+        scale : of the gyro
+        axes : (3, 3) that take the gyro's samples to the accelerometer's axes
+        """
         predicted = self.starts
-        for step in self.steps * (scale * np.array(signs)):
+        for step in scale * self.steps @ axes.T:
             predicted = _turned_back(predicted, step)
         return float(((predicted - self.ends) ** 2).sum())
 
-    def explained_by(self, scale: float, signs: tuple[float, ...] = (1.0, 1.0, 1.0)) -> bool:
+    def explained_by(self, scale: float, axes: NDArray[np.float64] = _AS_THEY_ARE) -> bool:
         """Whether this reading of the gyro explains how gravity turns, and the plain one does not."""
-        residual = self.residual(scale, signs)
+        residual = self.residual(scale, axes)
         return residual < EXPLAINS * self.at_rest and residual < BETTER * self.as_they_are
 
 

@@ -38,6 +38,11 @@ def point_times(lidar_topic: str, lidar_type: str) -> str:
     )
 
 
+def share_clock(lidar: Peek, other: Peek) -> bool:
+    """Whether two sensors are stamped by one clock, as far as the recorder's times tell."""
+    return abs(other.offset_ns - lidar.offset_ns) <= MAX_CLOCK_OFFSET * NS_PER_S
+
+
 def clocks(lidar: Peek, other: Peek, section: str, offset: float) -> str | None:
     """Return the sentence on two sensors stamped by different clocks, None if they share one.
 
@@ -46,9 +51,9 @@ def clocks(lidar: Peek, other: Peek, section: str, offset: float) -> str | None:
     section : of the payload that describes the other
     offset : s, what it adds to the stamps already
     """
-    difference = (other.offset_ns - lidar.offset_ns) / NS_PER_S
-    if abs(difference) <= MAX_CLOCK_OFFSET:
+    if share_clock(lidar, other):
         return None
+    difference = (other.offset_ns - lidar.offset_ns) / NS_PER_S
     return (
         f"{other.topic.name} and {lidar.topic.name} are stamped by clocks {difference:+.1f} s "
         f"apart; say so in the payload with '{section}: {{clock_offset: {offset - difference:.3f}}}', or "

@@ -128,6 +128,19 @@ class Recording:
         if (mirrored := imu_units.mirrored_axis(*samples)) is not None:
             self._opening_warnings.append(f"{self.imu_topic}: {mirrored}")
 
+    def clock_offsets(self) -> dict[str, float]:
+        """Return by sensor what is to be added to stamps of a clock that the lidar does not share, s.
+
+        By the recorder's times, so to its delays only: to some milliseconds.
+        """
+        lidar = self._peeks["lidar"]
+        others = {role: self._peeks[role] for role in ("imu", "encoder") if role in self._peeks}
+        return {
+            role: (lidar.offset_ns - other.offset_ns) / NS_PER_S
+            for role, other in others.items()
+            if not problems.share_clock(lidar, other)
+        }
+
     def clock_problems(self) -> list[str]:
         """Return a sentence for each sensor that does not share the lidar's clock."""
         found: list[str] = []
@@ -140,9 +153,16 @@ class Recording:
 
     def imu_batches(self) -> Iterator[Batch]:
         """Yield the IMU's samples alone, in a pass of their own that leaves the counts as is."""
-        if "imu" not in self._peeks:
+        return self._alone("imu")
+
+    def encoder_batches(self) -> Iterator[Batch]:
+        """Yield the encoder's angles alone, in a pass of their own that leaves the counts as is."""
+        return self._alone("encoder")
+
+    def _alone(self, role: str) -> Iterator[Batch]:
+        if role not in self._peeks:
             return iter(())
-        streams = {self._peeks["imu"].topic.name: self._open_streams(["imu"])["imu"]}
+        streams = {self._peeks[role].topic.name: self._open_streams([role])[role]}
         messages = self._source.messages(streams)
         return group_into_slots(messages, streams)
 

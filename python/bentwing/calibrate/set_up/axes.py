@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import itertools
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -41,7 +41,7 @@ def angle_between(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
 def named(axes: NDArray[np.float64]) -> Axes:
     """Return axes (3, 3) as payload.yaml has them: which axis of the samples each one is."""
     names = [("-" if row.sum() < 0 else "") + "xyz"[int(np.argmax(np.abs(row)))] for row in axes]
-    return tuple(names)  # type: ignore[return-value]
+    return cast("Axes", tuple(names))
 
 
 def of(axes: Axes) -> NDArray[np.float64]:

@@ -27,12 +27,11 @@ LARGEST_DELAY = 3.0  # s
 BACK, AWAY = np.radians(4.0), np.radians(20.0)
 MOST_DIFFERENT = 0.5  # of the logarithm of a range: what comes into view counts no more
 FEWEST = 100
-# The right delay must stand out by this share of the usual difference from all others.
-STANDS_OUT, NEARBY = 0.3, 0.15  # -, s
+CANDIDATES, NEARBY = 4, 0.15  # delays that are worth a trial, and s between them
 
 
-def delay_by_returns(stretch: Stretch, imu: ImuBatch) -> float | None:
-    """Return lidar stamps minus IMU clock, s; None where the motion does not tell.
+def delays_by_returns(stretch: Stretch, imu: ImuBatch) -> list[float]:
+    """Return lidar stamps minus IMU clock, s: the likeliest delays, best first; none if motion tells none.
 
     Parameters
     ----------
@@ -40,21 +39,27 @@ def delay_by_returns(stretch: Stretch, imu: ImuBatch) -> float | None:
     """
     scans = _Scans(stretch)
     if len(scans.times) < FEWEST or len(imu.times) < FEWEST:
-        return None
+        return []
     first, later = _pairs(scans.times, imu)
     if len(first) < FEWEST:
-        return None
+        return []
     steps = round(LARGEST_DELAY / scans.interval)
     delays = np.arange(-steps, steps + 1)
     costs = np.array([scans.difference(first + delay, later + delay) for delay in delays])
     if np.isfinite(costs).sum() < len(costs) // 4:
-        return None
-    best = int(np.nanargmin(costs))
-    others = costs[np.abs(delays - delays[best]) * scans.interval > NEARBY]
-    depth = float(np.nanmedian(costs)) - costs[best]
-    if np.nanmin(others) - costs[best] < STANDS_OUT * depth:
-        return None
-    return float(delays[best] * scans.interval)
+        return []
+    return [float(delays[i] * scans.interval) for i in _lowest(costs, round(NEARBY / scans.interval))]
+
+
+def _lowest(costs: NDArray[np.float64], apart: int) -> list[int]:
+    """Return the lowest minima, `apart` from each other."""
+    left = np.where(np.isfinite(costs), costs, np.inf)
+    found: list[int] = []
+    while len(found) < CANDIDATES and np.isfinite(left).any():
+        best = int(np.argmin(left))
+        found.append(best)
+        left[max(0, best - apart) : best + apart + 1] = np.inf
+    return found
 
 
 class _Scans:
@@ -66,8 +71,8 @@ class _Scans:
     """
 
     def __init__(self, stretch: Stretch) -> None:
-        points = np.concatenate([b.points for b in stretch.lidar])
-        times = np.concatenate([b.times for b in stretch.lidar])
+        lidar = stretch.lidar
+        points, times = lidar.points, lidar.times
         azimuths = np.arctan2(points[:, 1], points[:, 0])
         starts = np.concatenate([[0], np.flatnonzero(np.abs(np.diff(azimuths)) > 1.0) + 1])
         ranges = np.log(np.maximum(np.linalg.norm(points, axis=1), 1e-3))

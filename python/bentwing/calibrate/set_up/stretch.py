@@ -12,9 +12,10 @@ import numpy as np
 from bentwing.recording import imu_units
 from bentwing.recording.batches import EncoderBatch, ImuBatch, LidarBatch
 from bentwing.recording.preprocess import preprocess
+from bentwing.recording.readings import ImuReading, LidarReading
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator
 
     from numpy.typing import NDArray
 
@@ -25,12 +26,12 @@ BEFORE_MOTION = 3.0  # s of rest that begin it: how the motion begins shows the 
 SEARCHED = 600.0  # s in which motion is looked for
 MOVING = 0.15  # rad/s away from the first half second
 MOST_POINTS = 100_000  # a second; more would only take time
-UNCERTAIN = 1.5  # s by which the clocks may differ: that much more of the IMU is read on both sides
+AROUND = 0.5  # s of the IMU and the encoder before and after a part
 
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """Some seconds of a recording as its payload reads them.
+    """Some seconds of a recording.
 
     Attributes
     ----------
@@ -52,9 +53,9 @@ class Stretch:
         )
 
     @property
-    def lidar(self) -> tuple[LidarBatch, ...]:
-        """The batches of the lidar."""
-        return tuple(b for b in self.batches if isinstance(b, LidarBatch))
+    def lidar(self) -> LidarBatch:
+        """All points, at least one batch of them."""
+        return LidarBatch.joined([b for b in self.batches if isinstance(b, LidarBatch)])
 
     @property
     def encoder(self) -> EncoderBatch | None:
@@ -67,14 +68,29 @@ class Stretch:
         )
 
     @property
-    def span(self) -> tuple[float, float]:
-        """First and last stamp of the lidar, s."""
-        lidar = self.lidar
-        return float(lidar[0].times[0]), float(lidar[-1].times[-1])
+    def without_imu(self) -> Stretch:
+        """The same without inertial samples."""
+        return Stretch(tuple(b for b in self.batches if not isinstance(b, ImuBatch)))
+
+    def read_as(self, payload: Payload) -> Stretch:
+        """Return the samples as a payload reads those that drivers give, the encoder's apart."""
+        lidar, imu = LidarReading.of(payload.lidar), ImuReading.of(payload.imu)
+
+        def read(batch: Batch) -> Batch:
+            if isinstance(batch, LidarBatch):
+                points = lidar.batch(batch)
+                return replace(points, times=batch.times - payload.lidar.latency_read)
+            if isinstance(batch, EncoderBatch):
+                return replace(batch, times=batch.times - payload.lidar.latency_read)
+            gyro, accel = imu.gyro.vectors(batch.gyro), imu.accel.vectors(batch.accel)
+            return replace(batch, gyro=gyro, accel=accel)
+
+        return Stretch(tuple(read(batch) for batch in self.batches))
 
     def part(self, start: float, stop: float) -> Stretch:
         """Return what lies in `[start, stop)`, s, with a little more of the motor and the IMU."""
-        return Stretch(tuple(_trimmed(self.batches, start, stop)))
+        parts = (_trimmed(batch, start, stop) for batch in self.batches)
+        return Stretch(tuple(part for part in parts if len(part.times)))
 
     def preprocessed(self, payload: Payload) -> Iterator[Batch]:
         """Yield the batches as an estimator takes them."""
@@ -85,19 +101,20 @@ def read_stretch(recording: Recording, length: float = LENGTH) -> Stretch:
     """Read the first seconds in which the IMU moves; without an IMU the first seconds."""
     start = max(0.0, _first_motion(recording) - BEFORE_MOTION)
     thinning = _Thinning()
-    batches = recording.batches(start or None, length + UNCERTAIN)
+    batches = recording.batches(start or None, length)
     return Stretch(
         tuple(thinning.thinned(b) if isinstance(b, LidarBatch) else b for b in batches)
     )
 
 
 def _first_motion(recording: Recording) -> float:
-    times, gyro, _ = imu_units.collect(recording.imu_batches(), SEARCHED)
+    times, gyro, accel = imu_units.collect(recording.imu_batches(), SEARCHED)
     if len(times) < imu_units.MIN_SAMPLES:
         return 0.0
-    scaled = gyro * imu_units.gyro_scale(*imu_units.collect(recording.imu_batches()))
-    resting = np.median(scaled[times < times[0] + 0.5], axis=0)
-    moves = np.linalg.norm(scaled - resting, axis=1) > MOVING
+    n = int(np.searchsorted(times, times[0] + imu_units.CHECKED))
+    rates = gyro * imu_units.gyro_scale(times[:n], gyro[:n], accel[:n])
+    resting = np.median(rates[times < times[0] + 0.5], axis=0)
+    moves = np.linalg.norm(rates - resting, axis=1) > MOVING
     return float(times[int(np.argmax(moves))]) if moves.any() else 0.0
 
 
@@ -120,13 +137,9 @@ class _Thinning:
         return batch if self._step == 1 else batch.where(slice(None, None, self._step))
 
 
-def _trimmed(batches: Sequence[Batch], start: float, stop: float) -> Iterator[Batch]:
-    for batch in batches:
-        margin = 0.0 if isinstance(batch, LidarBatch) else 0.5
-        keep = (batch.times >= start - margin) & (batch.times < stop + margin)
-        if not keep.any():
-            continue
-        if isinstance(batch, EncoderBatch):
-            yield replace(batch, times=batch.times[keep], angles=batch.angles[keep])
-        else:
-            yield batch.where(keep)
+def _trimmed(batch: Batch, start: float, stop: float) -> Batch:
+    margin = 0.0 if isinstance(batch, LidarBatch) else AROUND
+    keep: NDArray[np.bool_] = (batch.times >= start - margin) & (batch.times < stop + margin)
+    if isinstance(batch, EncoderBatch):
+        return replace(batch, times=batch.times[keep], angles=batch.angles[keep])
+    return batch.where(keep)

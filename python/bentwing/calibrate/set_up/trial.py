@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""Try a description of the head on some seconds of a recording: does what is seen agree?"""
+"""Try a description of the head on some seconds of a recording."""
 
 from __future__ import annotations
 
@@ -53,6 +53,17 @@ class Trial:
             and last.n_matches >= FEWEST_MATCHES
             and last.inlier_share >= LEAST_INLIERS
             and last.residual_rms <= MOST_RESIDUAL
+        )
+
+    @property
+    def sentence(self) -> str:
+        """Say how badly it fits."""
+        share = None if self.last is None else self.last.inlier_share
+        agree = "none of" if not share else f"only {share:.0%} of"
+        return (
+            f"{agree} the surfaces that the lidar has seen twice agree, in the mount and with the axes "
+            "that fit best: check that the IMU is on the lidar's head, works and was recorded with "
+            "it, and the lidar's ranges and the times of its points"
         )
 
 

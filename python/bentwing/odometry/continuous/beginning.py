@@ -128,6 +128,7 @@ def _prior(beginning: Beginning, payload: Payload, before: OdometryPass | None) 
         has_motor=payload.encoder is not None,
         moving=moving,
         frozen=beginning.settings.frozen,
+        stated={} if payload.calibration is None else payload.calibration.std,
     )
     if static is not None:
         prior.reset("gyro_bias", static.gyro_bias_std)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +13,7 @@ from bentwing.base.calibration import STANDARD_GRAVITY
 from bentwing.base.errors import UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -45,6 +46,8 @@ INITIAL_STD = {
     "motor_tilt": 9e-3,
     "motor_offset": 3e-3,
 }
+# States of which a payload may state that they are less certain.
+DESCRIBED = ("latency", "extrinsic_rotation", "extrinsic_translation")
 MOVING_START_STD = {"gyro_bias": 0.01, "accel_bias": 0.05, "gravity": 0.2}
 # Random walks, per √s: clocks drift, mounts give way and warm up. In ten minutes 0.25 ms, 0.006° and
 # half a millimetre: no model is right to less.
@@ -77,10 +80,16 @@ class SlowStatePrior:
     """
 
     def __init__(
-        self, imu: Imu | None, *, has_motor: bool, moving: bool, frozen: Iterable[str]
+        self,
+        imu: Imu | None,
+        *,
+        has_motor: bool,
+        moving: bool,
+        frozen: Iterable[str],
+        stated: Mapping[str, Sequence[float]] = MappingProxyType({}),
     ) -> None:
         names = _frozen_names(frozen, has_imu=imu is not None, has_motor=has_motor)
-        std = initial_std(moving=moving)
+        std = initial_std(moving=moving) | _wider(stated)
         self.frozen = np.zeros(N_STATES, dtype=bool)
         self._information = np.zeros((N_STATES, N_STATES))
         self._offset = np.zeros(N_STATES)
@@ -181,6 +190,12 @@ class SlowStatePrior:
     ) -> NDArray[np.float64]:
         """Information of a window without that of its prior."""
         return _positive_part(np.linalg.inv(covariance[block]) - self._information[block])
+
+
+def _wider(stated: Mapping[str, Sequence[float]]) -> dict[str, float]:
+    """Return what is stated of latency and mount where that is less certain than usual."""
+    largest = {name: max(stated[name]) for name in DESCRIBED if stated.get(name)}
+    return {name: std for name, std in largest.items() if std > INITIAL_STD[name]}
 
 
 def named_std(covariance: NDArray[np.float64], frozen: NDArray[np.bool_]) -> dict[str, list[float]]:

@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""Payloads with one thing described differently."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bentwing.base import geometry
+from bentwing.calibrate.set_up import axes
+from bentwing.recording.readings import ACCEL_FACTORS, GYRO_FACTORS
+from bentwing.recording.sections.calibration import CalibrationRecord
+from bentwing.recording.sections.imu import AS_GIVEN, Imu, ImuUnits
+from bentwing.recording.sections.section import Transform
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from bentwing.recording import Payload
+
+LARGEST_LATENCY = 1.5  # s that a payload can describe; more goes into the clock's offset
+
+
+def as_given(payload: Payload) -> Payload:
+    """Return the payload that reads the samples of lidar and IMU as drivers give them."""
+    imu = with_imu(payload, axes=AS_GIVEN, gyro_axes=None, units=ImuUnits()) if payload.imu else payload
+    return with_lidar(imu, latency=0.0, mirrored=False, range_scale=1.0)
+
+
+def with_lidar(payload: Payload, **changes: Any) -> Payload:  # noqa: ANN401 - any field
+    """Return the payload with other values for its lidar."""
+    return payload.model_copy(update={"lidar": payload.lidar.model_copy(update=changes)})
+
+
+def with_imu(payload: Payload, **changes: Any) -> Payload:  # noqa: ANN401 - any field
+    """Return the payload with other values for its IMU."""
+    return payload.model_copy(update={"imu": (payload.imu or Imu()).model_copy(update=changes)})
+
+
+def with_encoder(payload: Payload, **changes: Any) -> Payload:  # noqa: ANN401 - any field
+    """Return the payload with other values for its encoder."""
+    assert payload.encoder is not None
+    return payload.model_copy(update={"encoder": payload.encoder.model_copy(update=changes)})
+
+
+def with_axes(
+    payload: Payload, gyro: NDArray[np.float64], accel: NDArray[np.float64]
+) -> Payload:
+    """Return the payload with axes (3, 3) of the IMU."""
+    own = None if np.array_equal(gyro, accel) else axes.named(gyro)
+    return with_imu(payload, axes=axes.named(accel), gyro_axes=own)
+
+
+def with_latency(payload: Payload, latency: float) -> Payload:
+    """Return the payload with a latency, s; what is too much for one goes to the IMU's clock."""
+    rest = latency if abs(latency) <= LARGEST_LATENCY else 0.0
+    shifted = with_lidar(payload, latency=round(rest, 6))
+    if rest or payload.imu is None:
+        return shifted
+    return with_imu(shifted, clock_offset=round(payload.imu.clock_offset + latency, 6))
+
+
+def with_rotation(payload: Payload, R: NDArray[np.float64]) -> Payload:
+    """Return the payload with another rotation (3, 3) of the lidar, or of its motor, in the IMU."""
+    quat = tuple(float(x) for x in geometry.from_matrices(R[None]).reshape(4))
+    if payload.encoder is not None:
+        turned = payload.encoder.T_imu_motor.model_copy(update={"quaternion": quat})
+        return with_encoder(payload, T_imu_motor=turned)
+    before = payload.T_imu_lidar or Transform()
+    return payload.model_copy(update={"T_imu_lidar": before.model_copy(update={"quaternion": quat})})
+
+
+def with_std(payload: Payload, **std: float) -> Payload:
+    """Return the payload with standard deviations of what it says of lidar and mount."""
+    known = payload.calibration or CalibrationRecord()
+    sizes = {"latency": 1}
+    named = {name: (value,) * sizes.get(name, 3) for name, value in std.items()}
+    return payload.model_copy(
+        update={"calibration": known.model_copy(update={"std": known.std | named})}
+    )
+
+
+def described_rotation(payload: Payload) -> NDArray[np.float64] | None:
+    """Return the rotation (3, 3) of the lidar, or of its motor, in the IMU; None if not described."""
+    if payload.encoder is not None:
+        return payload.encoder.T_imu_motor.pose.R
+    return None if payload.T_imu_lidar is None else payload.T_imu_lidar.pose.R
+
+
+def unit_of_gyro(scale: float) -> str | None:
+    """Return the unit in which a gyro of this scale gives its rates, None if it is none."""
+    return _unit(GYRO_FACTORS, scale)
+
+
+def unit_of_accel(scale: float) -> str | None:
+    """Return the unit in which an accelerometer of this scale gives its forces, None if it is none."""
+    return _unit(ACCEL_FACTORS, scale)
+
+
+def _unit(factors: Any, scale: float) -> str | None:  # noqa: ANN401 - keys are literals
+    named = {unit for unit, factor in factors.items() if abs(scale * factor - 1.0) < 0.1}
+    return named.pop() if named else None

@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""Find how a head is set up from its recording, starting from what the payload says."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bentwing.calibrate.set_up import edits
+from bentwing.calibrate.set_up.compare import findings_between
+from bentwing.calibrate.set_up.motor import UNITS, describe_motor, zero_between
+from bentwing.calibrate.set_up.planar import describe_by_trials
+from bentwing.calibrate.set_up.refine import refined
+from bentwing.calibrate.set_up.set_up import SetUp
+from bentwing.calibrate.set_up.spatial import NotFoundError, describe_by_motion, followed
+from bentwing.calibrate.set_up.stretch import Stretch, read_stretch
+from bentwing.calibrate.set_up.units import with_imu_units, with_range_unit
+from bentwing.odometry.planar import is_plane
+from bentwing.recording import EncoderBatch, Recording
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from bentwing.calibrate.set_up.motor import Joint
+    from bentwing.recording import Payload
+
+LOOKED_AT = 5000  # points that tell a 2D lidar from a 3D one
+
+
+def find_set_up(paths: Sequence[Path], payload: Payload, threads: int | None = None) -> SetUp:
+    """Return the head as its recording shows it.
+
+    Parameters
+    ----------
+    paths : consecutive parts of one recording
+    payload : the description to begin with; what holds of it is kept
+
+    Returns
+    -------
+    With a doubt where it could not be found, or where what was found does not hold; the payload is
+    then the one given.
+
+    Raises
+    ------
+    RecordingError
+        The recording cannot be read.
+    """
+    try:
+        found = _found(paths, payload, threads)
+    except NotFoundError as error:
+        return SetUp(payload, doubt=str(error))
+    return SetUp(found, findings_between(payload, found))
+
+
+def _found(paths: Sequence[Path], payload: Payload, threads: int | None) -> Payload:
+    start = edits.as_given(payload)
+    with Recording(paths, start, strict=False) as recording:
+        start = _with_clocks(recording, start)
+    with Recording(paths, start, strict=False) as recording:
+        stretch = read_stretch(recording)
+        imu_topic, encoder_topic = recording.imu_topic, recording.encoder_topic
+    points = stretch.lidar.points
+    if not len(points):
+        msg = "the lidar has no return in the part with motion: check that it was not covered"
+        raise NotFoundError(msg)
+    start = with_range_unit(start, points)
+    if imu_topic is not None:
+        start = with_imu_units(start, stretch.imu, imu_topic)
+    if encoder_topic is not None and start.encoder is not None:
+        start, stretch = _with_motor(paths, start, stretch, encoder_topic, threads)
+    if imu_topic is None:
+        return start
+    has_mount = payload.places_lidar_on_imu
+    if is_plane(points[:: max(1, len(points) // LOOKED_AT)]):
+        found = describe_by_trials(stretch, start, has_mount=has_mount, threads=threads)
+    else:
+        found = describe_by_motion(
+            stretch, start, imu_topic, has_mount=has_mount, threads=threads
+        )
+        found = _with_zero(start, found)
+    return refined(stretch, found, has_mount=has_mount, threads=threads)
+
+
+def _with_clocks(recording: Recording, payload: Payload) -> Payload:
+    """Return the payload with the offsets of clocks that count from somewhere else, in whole stamps."""
+    for role, offset in recording.clock_offsets().items():
+        change = edits.with_imu if role == "imu" else edits.with_encoder
+        payload = change(payload, clock_offset=offset)
+    return payload
+
+
+def _with_motor(
+    paths: Sequence[Path], payload: Payload, stretch: Stretch, topic: str, threads: int | None
+) -> tuple[Payload, Stretch]:
+    """Return payload and stretch with the joint that turns the lidar."""
+    alone = payload.model_copy(update={"encoder": None})
+    motion = followed(stretch.read_as(alone), alone, threads)
+    joints = _joints(paths, payload, stretch)
+    found = describe_motor(motion, joints, payload, topic)
+    assert found.encoder is not None
+    angles = joints[found.encoder.joint, found.encoder.unit]
+    signed = EncoderBatch(angles.times, found.encoder.sign * angles.angles)
+    others = tuple(b for b in stretch.batches if not isinstance(b, EncoderBatch))
+    return found, Stretch((signed, *others))
+
+
+def _joints(
+    paths: Sequence[Path], payload: Payload, stretch: Stretch
+) -> dict[Joint, EncoderBatch]:
+    """Read the angles of each joint in each unit, during a stretch."""
+    with Recording(paths, payload, strict=False) as recording:
+        names = recording.joints
+    found: dict[Joint, EncoderBatch] = {}
+    for name in names if len(names) > 1 else (None,):
+        for unit in UNITS:
+            read = edits.with_encoder(payload, joint=name, unit=unit, sign=1)
+            with Recording(paths, read, strict=False) as recording:
+                batches = [b for b in recording.encoder_batches() if isinstance(b, EncoderBatch)]
+            if batches:
+                found[name, unit] = _during(batches, stretch)
+    return found
+
+
+def _during(batches: list[EncoderBatch], stretch: Stretch) -> EncoderBatch:
+    times = np.concatenate([b.times for b in batches])
+    angles = np.concatenate([b.angles for b in batches])
+    lidar = stretch.lidar.times
+    keep = (times >= lidar[0] - 1.0) & (times <= lidar[-1] + 1.0)
+    return EncoderBatch(times[keep], angles[keep])
+
+
+def _with_zero(start: Payload, found: Payload) -> Payload:
+    """Return the payload with a turn of the motor about its own axis as the encoder's zero."""
+    if found.encoder is None or start.encoder is None or start.encoder.T_imu_motor == found.encoder.T_imu_motor:
+        return found
+    before, after = start.encoder.T_imu_motor.pose.R, found.encoder.T_imu_motor.pose.R
+    turn = zero_between(before, after, np.array(found.encoder.axis))
+    if turn is None:
+        return found
+    zero = float(np.remainder(start.encoder.zero + turn + np.pi, 2 * np.pi) - np.pi)
+    return edits.with_encoder(found, zero=zero, T_imu_motor=start.encoder.T_imu_motor)

@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""The set-up of a 2D lidar: descriptions are tried until what is seen fits together.
+
+A 2D lidar cannot be followed by itself, but with the IMU it can be, and only with the right mount,
+axes and delay do the surfaces of its turns agree.
+"""
+
+from __future__ import annotations
+
+import itertools
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from bentwing.calibrate.set_up import axes, edits
+from bentwing.calibrate.set_up.returns import delays_by_returns
+from bentwing.calibrate.set_up.rotations import cover
+from bentwing.calibrate.set_up.spatial import NotFoundError
+from bentwing.calibrate.set_up.trial import try_payload
+from bentwing.recording import imu_units
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import NDArray
+
+    from bentwing.calibrate.set_up.stretch import Stretch
+    from bentwing.calibrate.set_up.trial import Trial
+    from bentwing.recording import ImuBatch, Payload
+
+TRIED = 6.0  # s of the richest motion on which descriptions are tried
+CLOSE = 0.2  # rad, std of a rotation that is described
+WIDE = 0.5  # rad, std of a rotation that is one of a cover
+UNKNOWN_LATENCY = 0.02  # s, std once it was found
+UNKNOWN_SHIFT = 0.1  # m, std where no mount is described
+# Axes that explain how gravity turns nearly as well as the best are possible.
+AS_GOOD = 1.3
+SECOND_ROUNDS = 3
+
+
+def describe_by_trials(
+    stretch: Stretch, payload: Payload, *, has_mount: bool, threads: int | None
+) -> Payload:
+    """Return the payload with which what the lidar sees fits together.
+
+    Parameters
+    ----------
+    stretch : as drivers give it
+    has_mount : whether the payload describes the mount
+
+    Raises
+    ------
+    NotFoundError
+        None of the descriptions does.
+    """
+    trials = _Trials(stretch, threads)
+    delays = [0.0, *delays_by_returns(stretch, stretch.read_as(payload).imu)]
+    relative = list(_relative_axes(stretch.read_as(payload).imu))
+    if has_mount:
+        for delay, (gyro, accel) in itertools.product(delays, _own_axes(relative)):
+            described = edits.with_latency(edits.with_axes(payload, gyro, accel), delay)
+            if (found := trials.consistent(described, rotation=CLOSE)) is not None:
+                return found
+    centre = edits.described_rotation(payload) if has_mount else None
+    for delay, gyro in itertools.product(delays, relative):
+        described = edits.with_latency(edits.with_axes(payload, gyro, np.eye(3)), delay)
+        if (found := trials.searched(described, centre)) is not None:
+            return found
+    raise NotFoundError(trials.failure)
+
+
+class _Trials:
+    """Tries descriptions on the richest part of a stretch."""
+
+    def __init__(self, stretch: Stretch, threads: int | None) -> None:
+        self._stretch, self._threads = stretch, threads
+        self._best: Trial | None = None
+
+    def consistent(self, payload: Payload, *, rotation: float) -> Payload | None:
+        """Return what a description has become if all fits together with it."""
+        trial = self._tried(payload, rotation)
+        return _learned(payload, trial) if trial.is_consistent else None
+
+    def searched(self, payload: Payload, centre: NDArray[np.float64] | None) -> Payload | None:
+        """Look for the rotation of the lidar anywhere, nearest to `centre` first."""
+        middle = Rotation.identity() if centre is None else Rotation.from_matrix(centre)
+        trials = []
+        for rotation in cover(middle):
+            trial = self._tried(edits.with_rotation(payload, rotation.as_matrix()), WIDE)
+            if trial.is_consistent:
+                return _learned(payload, trial)
+            trials.append(trial)
+        trials.sort(key=lambda trial: -trial.score)
+        for trial in trials[:SECOND_ROUNDS]:
+            # From where it came to; what it saw first was blurred by where it came from.
+            if trial.calibration is None:
+                continue
+            again = self._tried(_learned(payload, trial), CLOSE)
+            if again.is_consistent:
+                return _learned(payload, again)
+        return None
+
+    @property
+    def failure(self) -> str:
+        """Say how well the best description did."""
+        return "nothing that can be seen" if self._best is None else self._best.sentence
+
+    def _tried(self, payload: Payload, rotation: float) -> Trial:
+        wide = edits.with_std(
+            payload,
+            extrinsic_rotation=rotation,
+            extrinsic_translation=UNKNOWN_SHIFT,
+            latency=UNKNOWN_LATENCY,
+        )
+        read = self._stretch.read_as(wide)
+        trial = try_payload(read.part(*richest(read.imu, TRIED)), wide, self._threads)
+        if self._best is None or trial.score > self._best.score:
+            self._best = trial
+        return trial
+
+
+def _learned(payload: Payload, trial: Trial) -> Payload:
+    """Return a payload with the rotation and the delay that a trial came to."""
+    assert trial.calibration is not None
+    mount = trial.calibration.mount
+    base = mount.T_imu_lidar if hasattr(mount, "T_imu_lidar") else mount.T_imu_motor
+    rotated = edits.with_rotation(trial.payload, base.R)
+    kept = rotated.model_copy(update={"calibration": payload.calibration})
+    return edits.with_latency(kept, trial.calibration.source_latency)
+
+
+def richest(imu: ImuBatch, length: float) -> tuple[float, float]:
+    """Return start and end, s, of the part in which the head turns most."""
+    steps = np.linalg.norm(imu.gyro[1:], axis=1) * np.diff(imu.times)
+    turned = np.concatenate([[0.0], np.cumsum(steps)])
+    starts = np.arange(imu.times[0], max(imu.times[-1] - length, imu.times[0]) + 0.1, 0.5)
+    ahead = np.interp(starts + length, imu.times, turned) - np.interp(starts, imu.times, turned)
+    start = float(starts[int(np.argmax(ahead))])
+    return start, start + length
+
+
+def _relative_axes(imu: ImuBatch) -> Iterator[NDArray[np.float64]]:
+    """Yield axes (3, 3) of the gyro, relative to the accelerometer's, that gravity's turn allows."""
+    windows = imu_units.GravityWindows(imu.times, imu.gyro, imu.accel)
+    rated = [(windows.residual(1.0, P), P) for P in axes.signed_permutations()]
+    least = min(residual for residual, _ in rated)
+    plain = rated[0][0]
+    if plain <= AS_GOOD * least or least > imu_units.EXPLAINS * windows.at_rest:
+        yield np.eye(3)
+        return
+    yield from (P for residual, P in sorted(rated, key=lambda r: r[0]) if residual <= AS_GOOD * least)
+
+
+def _own_axes(
+    relative: list[NDArray[np.float64]],
+) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+    """Yield axes of gyro and accelerometer of which one sensor, or both alike, is to blame."""
+    plain = np.eye(3)
+    for P in relative:
+        yield P, plain
+        if not np.array_equal(P, plain):
+            yield plain, P.T
+    if any(np.linalg.det(P) < 0.0 for P in relative):
+        # Left-handed axes of the whole IMU: a rate, an axial vector, turns the other way.
+        for axis in range(3):
+            flip = np.eye(3)
+            flip[axis, axis] = -1.0
+            yield flip, flip

@@ -82,7 +82,8 @@ def test_what_was_told_is_read_from_the_exit_code_the_record_and_the_output() ->
     verdict = {"state": "doubtful", "reasons": [{"kind": "clock", "sentence": "late"}]}
     record = {"verdict": verdict, "set_up": [{"what": "mount", "sentence": "turned"}]}
     assert told(0, record, "") == Told("doubtful", ("late",), ("turned",))
-    assert told(4, record, "gone") == Told("failed", ("late", "gone"), ("turned",))
+    assert told(4, record, "check all") == Told("failed", ("late",), ("turned",))
+    assert told(4, {}, "diverged") == Told("failed", ("diverged",))
 
 
 def options(**given) -> argparse.Namespace:

@@ -51,7 +51,10 @@ class Told:
 
 
 def told(code: int, record: dict | None, said: str) -> Told:
-    """What a run told, by its exit code, its record and what it printed."""
+    """What a run told, by its exit code, its record and what it printed.
+
+    What it advises to check is no cause that it names.
+    """
     found = record or {}
     verdict = found.get("verdict") or {}
     reasons = [reason["sentence"] for reason in verdict.get("reasons", [])]
@@ -59,7 +62,7 @@ def told(code: int, record: dict | None, said: str) -> Told:
     if code == 0:
         return Told(verdict.get("state", "good"), tuple(reasons), repairs)
     state = "failed" if code == 4 else "refused"
-    return Told(state, (*reasons, *said.splitlines()), repairs)
+    return Told(state, tuple(reasons or said.splitlines()), repairs)
 
 
 def outcome(told: Told, error: WorldError | None, good: WorldError, cause: str) -> Outcome:

@@ -32,7 +32,8 @@ _AXES = r"ax[ie]s|mirror|sign|handed|swap|permut|direction"
 _GYRO_AXES = rf"({GYRO}).*({_AXES})|({_AXES}).*({GYRO})"
 _ACCEL_AXES = rf"({ACCEL}).*({_AXES})|({_AXES}).*({ACCEL})"
 _IMU_AXES = rf"(IMU|{GYRO}|{ACCEL}).*({_AXES})|({_AXES}).*IMU|mount|T_imu_lidar"
-_SCALE = rf"({GYRO}).*(scale|unit|factor|times|%)"
+_SAME = rf"({GYRO}).*(zero|constant|same|still|stuck|dead|not (turn|change))"
+_SCALE = rf"({GYRO}).*(scale|unit|factor|times|%)|otherwise than the gyro"
 
 
 def changed(on_gyro: Function | None = None, on_accel: Function | None = None) -> Edit:
@@ -122,14 +123,14 @@ FAULTS = (
         "The gyro reads zero.",
         _gyro(np.zeros_like),
         "none",
-        rf"({GYRO}).*(zero|constant|still|dead|not turn)",
+        _SAME,
     ),
     Fault(
         "gyro-constant",
         "The gyro always reads the same.",
         _constant,
         "none",
-        rf"({GYRO}).*(constant|same|still|stuck|zero|not change)",
+        _SAME,
     ),
     Fault(
         "gyro-saturated",

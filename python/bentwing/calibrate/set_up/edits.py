@@ -9,7 +9,7 @@ import numpy as np
 
 from bentwing.base import geometry
 from bentwing.calibrate.set_up import axes
-from bentwing.recording.readings import ACCEL_FACTORS, GYRO_FACTORS
+from bentwing.recording.readings import GYRO_FACTORS
 from bentwing.recording.sections.calibration import CalibrationRecord
 from bentwing.recording.sections.imu import AS_GIVEN, Imu, ImuUnits
 from bentwing.recording.sections.section import Transform
@@ -18,7 +18,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bentwing.recording import Payload
+    from bentwing.recording.sections.imu import GyroUnit
 
+AS_GOOD_AS_ONE = 0.1
 LARGEST_LATENCY = 1.5  # s that a payload can describe; more goes into the clock's offset
 
 
@@ -53,12 +55,11 @@ def with_axes(
 
 
 def with_latency(payload: Payload, latency: float) -> Payload:
-    """Return the payload with a latency, s; what is too much for one goes to the IMU's clock."""
-    rest = latency if abs(latency) <= LARGEST_LATENCY else 0.0
-    shifted = with_lidar(payload, latency=round(rest, 6))
-    if rest or payload.imu is None:
-        return shifted
-    return with_imu(shifted, clock_offset=round(payload.imu.clock_offset + latency, 6))
+    """Return the payload with a latency, s; of clocks that are not one it goes to the IMU's."""
+    offset = 0.0 if payload.imu is None else payload.imu.clock_offset
+    if offset == 0.0 and abs(latency) <= LARGEST_LATENCY:
+        return with_lidar(payload, latency=round(latency, 6))
+    return with_imu(with_lidar(payload, latency=0.0), clock_offset=round(offset + latency, 6))
 
 
 def with_rotation(payload: Payload, R: NDArray[np.float64]) -> Payload:
@@ -88,16 +89,9 @@ def described_rotation(payload: Payload) -> NDArray[np.float64] | None:
     return None if payload.T_imu_lidar is None else payload.T_imu_lidar.pose.R
 
 
-def unit_of_gyro(scale: float) -> str | None:
+def unit_of_gyro(scale: float) -> GyroUnit | None:
     """Return the unit in which a gyro of this scale gives its rates, None if it is none."""
-    return _unit(GYRO_FACTORS, scale)
+    units = [unit for unit, factor in GYRO_FACTORS.items() if abs(scale * factor - 1.0) < AS_GOOD_AS_ONE]
+    return units[0] if units else None
 
 
-def unit_of_accel(scale: float) -> str | None:
-    """Return the unit in which an accelerometer of this scale gives its forces, None if it is none."""
-    return _unit(ACCEL_FACTORS, scale)
-
-
-def _unit(factors: Any, scale: float) -> str | None:  # noqa: ANN401 - keys are literals
-    named = {unit for unit, factor in factors.items() if abs(scale * factor - 1.0) < 0.1}
-    return named.pop() if named else None

@@ -12,6 +12,8 @@ from bentwing.calibrate.set_up import axes, edits
 from bentwing.calibrate.set_up.explain import explain
 from bentwing.calibrate.set_up.hand_eye import fit_accel, fit_gyro
 from bentwing.calibrate.set_up.motion import lidar_motion
+from bentwing.recording.readings import GYRO_FACTORS
+from bentwing.recording.sections.imu import Imu
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -118,16 +120,15 @@ def _accel_axes(
 
 def _scaled(payload: Payload, gyro: GyroFit, imu_topic: str) -> Payload:
     """Return the payload with the unit of the gyro."""
-    unit = edits.unit_of_gyro(gyro.scale)
+    imu = payload.imu or Imu()
+    unit = edits.unit_of_gyro(gyro.scale / GYRO_FACTORS[imu.units.gyro])
     if unit is None:
         msg = (
             f"{imu_topic}: the gyro shows {gyro.scale:.2f} times the turn that the lidar sees; "
             "correct its scale in the driver"
         )
         raise NotFoundError(msg)
-    imu = payload.imu
-    units = {} if imu is None else {"units": imu.units.model_copy(update={"gyro": unit})}
-    return edits.with_imu(payload, **units)
+    return edits.with_imu(payload, units=imu.units.model_copy(update={"gyro": unit}))
 
 
 def _unlike(imu_topic: str, gyro: GyroFit) -> str:

@@ -83,7 +83,3 @@ def main() -> None:
                 )  # fmt: skip
                 print(row_of(scenario, Path(scratch) / f"{head}-{scene}"), flush=True)
                 seed += 1
-
-
-if __name__ == "__main__":
-    main()

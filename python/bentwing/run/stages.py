@@ -66,7 +66,8 @@ def estimate(job: Job, found: Found, engine: Estimator) -> Found:
             for batch in part.batches(shown, counts):
                 engine.feed(batch)
                 spin.watch(batch)
-                carrier.add(batch)
+                if not part.payload.self_hits:
+                    carrier.add(batch)
             open_loop = engine.result()
     except BaseException as error:
         failure = error

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 import yaml
@@ -127,6 +129,36 @@ def test_info_writes_what_it_was_given_or_what_the_recording_tells(bentwing, off
     assert Payload.load(tmp_path / "given.yaml") == Payload.load(given)
     bentwing("info", bag, "--write-payload", tmp_path / "told.yaml")
     assert Payload.load(tmp_path / "told.yaml").lidar.kind == "hokuyo-utm30lx"
+
+
+def test_info_proposes_and_writes_boxes_around_the_carrier(
+    bentwing, office, tmp_path, changed_payload
+):
+    bag, bare = office / "recording.bag", changed_payload(self_hits=None)
+    said = bentwing("info", bag, "-p", bare, "--write-payload", tmp_path / "boxed.yaml")
+    assert said.code == 0, said.err
+    assert "carrier    seen from (" in said.out
+    boxes = Payload.load(tmp_path / "boxed.yaml").self_hits
+    assert 1 <= len(boxes) <= 4
+    found = json.loads(bentwing("info", bag, "-p", bare, "--json").out)
+    assert [one["box"]["min"] for one in found["self_hits"]] == [list(b.box.min) for b in boxes]
+    (warning,) = [text for text in found["warnings"] if "its own carrier" in text]
+    assert f"min: {list(boxes[0].box.min)}" in warning
+    masked = json.loads(bentwing("info", bag, "-p", office / "payload.yaml", "--json").out)
+    assert masked["self_hits"] == []
+
+
+@pytest.mark.slow
+def test_map_says_once_that_the_carrier_comes_into_it(bentwing, office, tmp_path, changed_payload):
+    out = tmp_path / "run"
+    said = bentwing(
+        "map", office / "recording.bag", "-p", changed_payload(self_hits=None), "-o", out,
+        "--no-loop-closure", "--map-spacing", 0.2,
+    )  # fmt: skip
+    assert said.code == 0, said.err
+    warnings = json.loads((out / "run.json").read_text())["warnings"]
+    assert sum("its own carrier" in text for text in warnings) == 1
+    assert " ".join((said.out + said.err).split()).count("its own carrier") == 1
 
 
 @pytest.mark.slow

@@ -25,11 +25,11 @@ def command(
 ) -> int | None:
     """Check a recording: topics, rates, gaps, spin, stalls and visible structure, with a verdict."""
     # slow to import, so only when it is needed
-    import dataclasses
     import json
 
     from rich.console import Console
 
+    from bentwing.base.plain import plain
     from bentwing.calibrate.draft import draft_payload
     from bentwing.calibrate.inspection import inspect
     from bentwing.cli.info_page import page
@@ -37,9 +37,9 @@ def command(
     options.require_new_file(write_payload)
     inspection = inspect(recording, payload)
     if write_payload is not None:
-        draft_payload(recording, payload).save(write_payload)
+        draft_payload(recording, payload, inspection.self_hits).save(write_payload)
     if as_json:
-        typer.echo(json.dumps({**dataclasses.asdict(inspection), "is_fit": inspection.is_fit}))
+        typer.echo(json.dumps({**plain(inspection), "is_fit": inspection.is_fit}))
     else:
         console = Console()
         for part in page(inspection):

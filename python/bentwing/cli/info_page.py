@@ -66,6 +66,9 @@ def _sensors(inspection: Inspection) -> Iterator[str]:
     if inspection.static_start is not None:
         start, end = inspection.static_start
         yield f"start      static from {start:.1f} to {end:.1f} s"
+    for one in inspection.self_hits:
+        first, last = ([f"{c:.2f}" for c in corner] for corner in (one.box.min, one.box.max))
+        yield f"carrier    seen from ({' '.join(first)}) to ({' '.join(last)}) m, lidar frame"
     structure = inspection.structure
     if structure is not None and structure.n_points:
         low, _, middle, _, high = structure.range_percentiles

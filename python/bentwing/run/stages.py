@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from bentwing.base.errors import EstimationError, NotEnoughDataError
 from bentwing.base.progress import Progress
+from bentwing.calibrate.carrier import CarrierWatch, carrier_warnings
 from bentwing.closing.georeference.georeference import georeference
 from bentwing.closing.global_registration import Budget, close_loops
 from bentwing.closing.joining.segments import close_segments
@@ -57,6 +58,7 @@ class Job:
 def estimate(job: Job, found: Found, engine: Estimator) -> Found:
     """Find the open-loop trajectory and the calibration; with a failure, as far as they go."""
     part, counts, spin = job.part, Counter[str](), Spin()
+    carrier = CarrierWatch(part.payload)
     failure: BaseException | None = None
     open_loop: Estimate | None = None
     try:
@@ -64,6 +66,8 @@ def estimate(job: Job, found: Found, engine: Estimator) -> Found:
             for batch in part.batches(shown, counts):
                 engine.feed(batch)
                 spin.watch(batch)
+                if not part.payload.self_hits:
+                    carrier.add(batch)
             open_loop = engine.result()
     except BaseException as error:
         failure = error
@@ -72,7 +76,8 @@ def estimate(job: Job, found: Found, engine: Estimator) -> Found:
         if isinstance(error, (EstimationError, KeyboardInterrupt)):
             with suppress(lacking):
                 open_loop = engine.so_far()
-    reading = Reading(dict(part.recording.counts + counts), list(part.recording.warnings))
+    warnings = [*part.recording.warnings, *carrier_warnings(part.payload, carrier.boxes())]
+    reading = Reading(dict(part.recording.counts + counts), warnings)
     return replace(found, estimate=open_loop, reading=reading, spin=spin, failure=failure)
 
 

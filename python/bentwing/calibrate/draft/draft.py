@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from bentwing.recording.containers.scanned import TopicInfo
     from bentwing.recording.containers.source import Source
     from bentwing.recording.payload import PayloadLike
+    from bentwing.recording.sections.self_hits import SelfHit
 
 HEAD = """\
 # The sensor head of {recordings}, as far as the recording tells it.
@@ -54,13 +55,18 @@ class Draft:
         write_text(path, self.to_yaml())
 
 
-def draft_payload(paths: Path | str | Sequence[Path | str], payload: PayloadLike = None) -> Draft:
+def draft_payload(
+    paths: Path | str | Sequence[Path | str],
+    payload: PayloadLike = None,
+    self_hits: Sequence[SelfHit] = (),
+) -> Draft:
     """Return the sensor head as far as the recording tells it: topics, lidar, IMU, encoder.
 
     Parameters
     ----------
     paths : one recording, or its consecutive parts
     payload : what is known already; nothing that it says is changed
+    self_hits : what the lidar sees of its carrier beyond that
 
     Raises
     ------
@@ -72,6 +78,8 @@ def draft_payload(paths: Path | str | Sequence[Path | str], payload: PayloadLike
     try:
         described, others = _described(source, listed[0].stem)
         head = described if payload is None else as_payload(payload)
+        if self_hits:
+            head = head.model_copy(update={"self_hits": (*head.self_hits, *self_hits)})
         asked = [*(others if payload is None else ()), *questions.of(head, source.topics)]
     finally:
         source.close()

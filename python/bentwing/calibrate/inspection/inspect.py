@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,11 +11,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bentwing.base.errors import RecordingError
+from bentwing.calibrate.carrier import CarrierWatch, carrier_warnings
 from bentwing.calibrate.inspection import fitness
 from bentwing.calibrate.inspection.spin import Spin, spin_from_encoder, spin_from_gyro
 from bentwing.calibrate.inspection.structure import Structure, StructureMeter
 from bentwing.recording.batches import EncoderBatch, ImuBatch
 from bentwing.recording.containers.source import open_source
+from bentwing.recording.preprocess import Preprocessing
 from bentwing.recording.recording import Recording
 
 if TYPE_CHECKING:
@@ -23,6 +26,7 @@ if TYPE_CHECKING:
     from bentwing.calibrate.inspection.fitness import Stretch
     from bentwing.recording.containers.scanned import TopicInfo
     from bentwing.recording.payload import PayloadLike
+    from bentwing.recording.sections.self_hits import SelfHit
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +54,7 @@ class Inspection:
     spin : rate of turn over time, None without IMU and encoder
     static_start : (start, end) s, None where the recording starts in motion or has no IMU
     structure : what the lidar saw
+    self_hits : boxes around what it saw of its own carrier, beyond those of the payload
     counts : everything read and dropped
     defects : what prevents mapping, each with how to repair it
     warnings : what may make the map worse
@@ -63,6 +68,7 @@ class Inspection:
     spin: Spin | None = None
     static_start: Stretch | None = None
     structure: Structure | None = None
+    self_hits: tuple[SelfHit, ...] = ()
     counts: dict[str, int] = field(default_factory=dict)
     defects: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
@@ -125,8 +131,8 @@ def _topic_report(
 
 def _inspect_recording(recording: Recording, *, has_payload: bool) -> Inspection:
     judgement = fitness.judge(recording, has_payload=has_payload)
-    spin, structure = _read(recording, judgement.gyro_scale)
-    warnings = list(judgement.warnings)
+    spin, structure, carrier = _read(recording, judgement.gyro_scale)
+    warnings = list(judgement.warnings) + carrier_warnings(recording.payload, carrier)
     if spin is not None:
         warnings += fitness.stall_warnings(spin)
     roles = {
@@ -154,31 +160,37 @@ def _inspect_recording(recording: Recording, *, has_payload: bool) -> Inspection
         spin,
         judgement.static_start,
         structure,
+        carrier,
         dict(recording.counts),
         judgement.defects,
         recording.warnings + warnings,
     )
 
 
-def _read(recording: Recording, gyro_scale: float) -> tuple[Spin | None, Structure]:
+def _read(
+    recording: Recording, gyro_scale: float
+) -> tuple[Spin | None, Structure, tuple[SelfHit, ...]]:
     """Pass once over the recording, keeping the small streams whole and summing up the lidar's."""
     imu: list[ImuBatch] = []
     encoder: list[EncoderBatch] = []
-    meter = StructureMeter()
+    meter, carrier = StructureMeter(), CarrierWatch(recording.payload)
+    preprocessing = Preprocessing(recording.payload, Counter())
     for batch in recording.batches():
+        for usable in preprocessing.add(batch):
+            carrier.add(usable)
         if isinstance(batch, ImuBatch):
             imu.append(batch)
         elif isinstance(batch, EncoderBatch):
             encoder.append(batch)
         else:
             meter.add(batch)
-    structure = meter.result(recording.counts["lidar.returns"])
+    structure, boxes = meter.result(recording.counts["lidar.returns"]), carrier.boxes()
     if sum(len(batch.times) for batch in encoder) > 1:
         times, angles = (
             np.concatenate([getattr(b, n) for b in encoder]) for n in ("times", "angles")
         )
-        return spin_from_encoder(times, angles), structure
+        return spin_from_encoder(times, angles), structure, boxes
     if sum(len(batch.times) for batch in imu) > 1:
         times, gyro = (np.concatenate([getattr(b, n) for b in imu]) for n in ("times", "gyro"))
-        return spin_from_gyro(times, gyro_scale * gyro), structure
-    return None, structure
+        return spin_from_gyro(times, gyro_scale * gyro), structure, boxes
+    return None, structure, boxes

@@ -86,9 +86,7 @@ def command(
     flights = flights_of(recording) if len(recording) > 1 else [recording]
     if len(flights) > 1:
         merged = map_flights(flights, out, chosen, payload, resume=resume, progress=progress)
-        if not quiet:
-            say_maps(merged)
+        say_maps(merged, quiet=quiet)
         return
-    run_recording(recording, out, chosen, payload, resume=resume, progress=progress)
-    if not quiet:
-        say_run(out)
+    found = run_recording(recording, out, chosen, payload, resume=resume, progress=progress)
+    say_run(out, found.verdict, quiet=quiet)

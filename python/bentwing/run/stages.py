@@ -14,6 +14,7 @@ from bentwing.closing.georeference.georeference import georeference
 from bentwing.closing.global_registration import Budget, close_loops
 from bentwing.closing.joining.segments import close_segments
 from bentwing.closing.localize import Difference, NotInMapError, find_in_map
+from bentwing.evaluate.verdict import Watch, judge_closing, judge_estimate, judge_revisits
 from bentwing.map.project import project
 from bentwing.run.found import Found, Reading, Spin
 from bentwing.run.mapping import MapSource, write_map
@@ -56,7 +57,7 @@ class Job:
 
 def estimate(job: Job, found: Found, engine: Estimator) -> Found:
     """Find the open-loop trajectory and the calibration; with a failure, as far as they go."""
-    part, counts, spin = job.part, Counter[str](), Spin()
+    part, counts, spin, watch = job.part, Counter[str](), Spin(), Watch()
     failure: BaseException | None = None
     open_loop: Estimate | None = None
     try:
@@ -64,6 +65,7 @@ def estimate(job: Job, found: Found, engine: Estimator) -> Found:
             for batch in part.batches(shown, counts):
                 engine.feed(batch)
                 spin.watch(batch)
+                watch.add(batch)
             open_loop = engine.result()
     except BaseException as error:
         failure = error
@@ -73,7 +75,15 @@ def estimate(job: Job, found: Found, engine: Estimator) -> Found:
             with suppress(lacking):
                 open_loop = engine.so_far()
     reading = Reading(dict(part.recording.counts + counts), list(part.recording.warnings))
-    return replace(found, estimate=open_loop, reading=reading, spin=spin, failure=failure)
+    evidence = () if open_loop is None else judge_estimate(open_loop, part.payload, watch)
+    return replace(
+        found,
+        estimate=open_loop,
+        reading=reading,
+        spin=spin,
+        evidence=tuple(evidence),
+        failure=failure,
+    )
 
 
 def close(job: Job, found: Found) -> Found:
@@ -115,6 +125,7 @@ def close(job: Job, found: Found) -> Found:
         estimate=closed.estimate,
         loop_closure=closed.record,
         stage_warnings=(*found.stage_warnings, *closed.warnings),
+        evidence=(*found.evidence, *judge_closing(closed.record, open_loop.trajectory)),
     )
 
 
@@ -176,7 +187,8 @@ def make_map(job: Job, found: Found) -> Found:
             placed=found.placed,
             difference=difference,
         )
-    return replace(found, map=written)
+    evidence = judge_revisits(written.revisits, part.payload.lidar.range_sigma)
+    return replace(found, map=written, evidence=(*found.evidence, *evidence))
 
 
 def _known(found: Found) -> Estimate:

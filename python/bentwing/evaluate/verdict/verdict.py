@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from bentwing.evaluate.verdict.kinds import KINDS
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Iterable, Mapping
 
     from bentwing.base.spans import Span
     from bentwing.evaluate.verdict.evidence import Evidence
@@ -62,12 +62,12 @@ class Verdict:
         return _HEADLINES[self.state]
 
     def sentence(self) -> str:
-        """Return the verdict with its main reason, for the console."""
+        """Return the state with the main reason, for the console."""
         if not self.reasons:
-            return f"{self.headline}: all that was checked agrees"
+            return "good"
         main, *others = self.reasons
-        more = f" (and {len(others)} more, see report.html)" if others else ""
-        return f"{self.headline}: {main.sentence}; {main.advice}{more}"
+        more = f" (report.html has {len(others)} more)" if others else ""
+        return f"{self.state}: {main.sentence}; {main.advice}{more}"
 
     def to_json(self) -> dict[str, Any]:
         """Return the verdict as run.json has it."""
@@ -108,23 +108,23 @@ class Verdict:
 
 
 _HEADLINES = {
-    "good": "The map is good",
-    "doubtful": "The map is doubtful",
-    "failed": "The map is wrong and must not be used",
+    "good": "Good: all that was checked agrees",
+    "doubtful": "Doubtful: check this map before using it",
+    "failed": "Failed: this map is wrong, do not use it",
 }
 
 
-def verdict_of(evidence: Iterable[Evidence]) -> Verdict:
-    """Weigh evidence: the gravest piece decides."""
+def verdict_of(evidence: Iterable[Evidence], judged: Iterable[Reason] = ()) -> Verdict:
+    """Weigh evidence: the gravest piece decides.
+
+    Parameters
+    ----------
+    judged : reasons that are known already
+    """
     found = list(evidence)
-    reasons = sorted(filter(None, map(_reason, found)), key=_order)
-    return verdict_with(reasons, {one.kind: one.value for one in found})
-
-
-def verdict_with(reasons: Sequence[Reason], measures: Mapping[str, float]) -> Verdict:
-    """Return the verdict that reasons make, the gravest first."""
-    state: State = max((r.state for r in reasons), key=_RANK.__getitem__, default="good")
-    return Verdict(state, tuple(reasons), measures)
+    reasons = sorted([*judged, *filter(None, map(_reason, found))], key=_order)
+    state: State = reasons[0].state if reasons else "good"
+    return Verdict(state, tuple(reasons), {one.kind: one.value for one in found})
 
 
 def _reason(evidence: Evidence) -> Reason | None:

@@ -2,7 +2,8 @@
 """Fills `<!-- options: map -->` and `<!-- settings: kalman -->` with tables while the pages are built.
 
 The tables come from the command line and the settings models themselves. `<!-- settings:
-CleanSettings.moving -->` is a table of one setting.
+CleanSettings.moving -->` is a table of one setting, `<!-- faults: encoder -->` one of the faults whose
+names begin so.
 """
 
 from __future__ import annotations
@@ -19,13 +20,14 @@ from bentwing.cli.commands import load
 from bentwing.closing import MatchSettings, PlaceSettings
 from bentwing.odometry import EstimatorName
 from bentwing.run.settings import RunSettings
+from bentwing.simulate.faults import FAULTS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from pydantic.fields import FieldInfo
 
-MARKER = re.compile(r"^<!-- (options|settings): ([\w.]+) -->$", re.MULTILINE)
+MARKER = re.compile(r"^<!-- (options|settings|faults): ([\w.]+) -->$", re.MULTILINE)
 _ESTIMATORS = get_args(EstimatorName)
 _BOUNDS = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤"}
 
@@ -41,11 +43,13 @@ def table(kind: str, name: str) -> str:
     Raises
     ------
     KeyError
-        If there is no command, estimator, settings model or setting of that name.
+        If there is no command, estimator, settings model, setting or fault of that name.
     """
     if kind == "options":
         parameters = sorted(load(name).params, key=lambda one: rank(one.rich_help_panel))
         return _markdown(("option", "default", "meaning"), map(option_row, parameters))
+    if kind == "faults":
+        return _markdown(("fault", "what is wrong"), fault_rows(name))
     name, _, only = name.partition(".")
     model, prefix = settings_models()[name]
     fields = {only: model.model_fields[only]} if only else model.model_fields
@@ -66,6 +70,14 @@ def option_row(parameter: Any) -> tuple[str, ...]:  # noqa: ANN401 - typer hides
     if not all(choice in meaning for choice in choices):
         meaning += f" One of {', '.join(f'`{choice}`' for choice in choices)}."
     return ", ".join(f"`{name}`" for name in names), _default_of(parameter), meaning
+
+
+def fault_rows(family: str) -> list[tuple[str, ...]]:
+    """Return name and sentence of the faults whose names begin with a word."""
+    found = [one for name, one in FAULTS.items() if name.startswith(family)]
+    if not found:
+        raise KeyError(family)
+    return [(f"`{one.name}`", one.does) for one in found]
 
 
 def setting_row(name: str, field: FieldInfo) -> tuple[str, ...]:

@@ -12,6 +12,7 @@ import pytest
 from bentwing.cli.commands import COMMANDS, load
 from bentwing.map import MAP_FORMATS
 from bentwing.odometry import ESTIMATORS
+from bentwing.simulate.faults import FAULTS
 
 ROOT = Path(__file__).parents[2]
 
@@ -76,6 +77,18 @@ def test_a_table_has_default_unit_and_range(hook):
     assert "`surfels.max_gap`" in surfels
 
 
+def test_a_table_has_the_faults_of_a_family(hook):
+    rows = dict(rows_of(hook.table("faults", "encoder")))
+    assert rows["`encoder-degrees`"] == "The encoder is in degrees."
+    assert all(name.startswith("`encoder-") for name in rows)
+
+
+def test_the_page_of_simulate_has_every_fault(hook):
+    page = (ROOT / "docs" / "commands" / "simulate.md").read_text(encoding="utf-8")
+    filled = hook.on_page_markdown(page)
+    assert set(re.findall(r"^\| `([\w.-]+)` \|", filled, re.MULTILINE)) >= set(FAULTS)
+
+
 def test_every_setting_is_described_with_its_unit(hook):
     for known, (model, _) in hook.settings_models().items():
         assert "Undefined" not in hook.table("settings", known)
@@ -88,10 +101,12 @@ def test_every_setting_is_described_with_its_unit(hook):
 def test_every_marker_of_the_documentation_is_filled_in(hook):
     for page in sorted((ROOT / "docs").rglob("*.md")):
         filled = hook.on_page_markdown(page.read_text(encoding="utf-8"))
-        assert not re.search(r"<!-- *(options|settings)\b", filled), page
+        assert not re.search(r"<!-- *(options|settings|faults)\b", filled), page
 
 
-@pytest.mark.parametrize("marker", ["options: mop", "settings: mop", "settings: CleanSettings.mop"])
+@pytest.mark.parametrize(
+    "marker", ["options: mop", "settings: mop", "faults: mop", "settings: CleanSettings.mop"]
+)
 def test_a_marker_of_nothing_stops_the_build(hook, marker):
     with pytest.raises((KeyError, ModuleNotFoundError), match="mop"):
         hook.on_page_markdown(f"<!-- {marker} -->")

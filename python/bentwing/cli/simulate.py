@@ -10,6 +10,7 @@ from bentwing.cli import options
 from bentwing.cli.options import RESULT, enumeration, option
 from bentwing.simulate.names import (
     EventName,
+    FaultName,
     FlightName,
     HeadName,
     ReceiverName,
@@ -20,10 +21,12 @@ from bentwing.simulate.names import (
 
 if TYPE_CHECKING:
     from enum import Enum as Event
+    from enum import Enum as Fault
 
     from bentwing.simulate import Scenario
 else:
     Event = enumeration("Event", get_args(EventName))
+    Fault = enumeration("Fault", get_args(FaultName))
 
 
 EXAMPLES = (
@@ -31,6 +34,7 @@ EXAMPLES = (
     "bentwing simulate office --head vlp16-motor --flight stand -o stand",
     "bentwing simulate town --gnss rtk --format mcap -o town",
     "bentwing simulate office --event spin-stall --stall 10 -o stall",
+    "bentwing simulate office --fault gyro-degrees -o degrees",
 )
 
 WORLD = "World and flight"
@@ -108,6 +112,15 @@ def command(
         float,
         option(TROUBLE, metavar="SECONDS", help="How long the head stands still in spin-stall."),
     ] = 4.0,
+    fault: Annotated[
+        Fault | None,
+        option(
+            TROUBLE,
+            metavar="NAME",
+            help=f"What is wrongly set up: {', '.join(get_args(FaultName))}.",
+            show_default="none",
+        ),
+    ] = None,
     calibrated: Annotated[
         bool, option(TROUBLE, "--calibrated", help="The payload is exact, the clocks agree.")
     ] = False,
@@ -139,7 +152,7 @@ def command(
         "gnss": gnss,
         "calibrated": calibrated,
     }
-    _run(_scenario(choices), out, quiet=quiet)
+    _run(_scenario(choices), None if fault is None else fault.value, out, quiet=quiet)
 
 
 def _scenario(choices: dict[str, object]) -> "Scenario":
@@ -156,16 +169,24 @@ def _scenario(choices: dict[str, object]) -> "Scenario":
         raise UsageError(describe(error, Scenario, "this cannot be simulated")) from None
 
 
-def _run(scenario: "Scenario", out: Path, *, quiet: bool) -> None:
+def _run(scenario: "Scenario", fault: str | None, out: Path, *, quiet: bool) -> None:
     from rich.console import Console
     from rich.progress import Progress
 
     from bentwing.simulate import simulate
+    from bentwing.simulate.faults.simulation import simulate_with_fault
 
     console = Console(quiet=quiet)
     with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task(f"simulating {scenario.scene}", total=scenario.duration)
-        files = simulate(scenario, out, lambda time: bar.update(task, completed=time))
+
+        def show(time: float) -> None:
+            bar.update(task, completed=time)
+
+        if fault is None:
+            files = simulate(scenario, out, show)
+        else:
+            files = simulate_with_fault(scenario, fault, out, show)
     console.print(f"recording  {files.recording}", highlight=False, soft_wrap=True)
     console.print(f"payload    {files.payload}", highlight=False, soft_wrap=True)
     console.print(f"truth      {files.trajectory}", highlight=False, soft_wrap=True)

@@ -26,3 +26,19 @@ EventName: TypeAlias = Literal[
     "gap",
     "motor-reversal",
 ]
+FaultName: TypeAlias = Literal[
+    "mount-90-x", "mount-90-y", "mount-90-z", "mount-180-x", "mount-180-y", "mount-180-z",
+    "mount-wxyz", "mount-tilted", "mount-random",
+    "gyro-swapped", "gyro-cyclic", "gyro-one-negated", "gyro-negated", "gyro-zero",
+    "gyro-constant", "gyro-saturated", "gyro-1.2", "gyro-2", "gyro-degrees",
+    "accel-swapped", "accel-cyclic", "accel-one-negated", "accel-negated", "accel-g",
+    "accel-milli-g", "accel-no-gravity",
+    "imu-cyclic", "imu-left-handed", "imu-of-another", "imu-frozen", "imu-10hz", "elevator",
+    "lidar-late-0.05", "lidar-early-0.05", "lidar-late-0.5", "lidar-early-0.5",
+    "lidar-late-1", "lidar-early-1", "lidar-late-3", "lidar-early-3",
+    "lidar-power-on", "imu-power-on", "lidar-drifting",
+    "lidar-mirrored", "lidar-upside-down", "ranges-1.3", "ranges-millimetres", "ranges-random",
+    "ranges-constant", "points-shuffled", "lidar-level",
+    "encoder-degrees", "encoder-negated", "encoder-turned", "encoder-late", "encoder-axis",
+    "encoder-second",
+]  # fmt: skip

@@ -83,12 +83,17 @@ def write_recording(
     return files
 
 
-def _files(out: Path, kind: str) -> SimulatedRecording:
-    recording = out / ("recording.bag" if kind == "bag" else "recording")
+def require_no_recording(out: Path) -> None:
+    """Refuse a folder that holds a recording already."""
     for existing in (out / "recording.bag", out / "recording"):
         if existing.exists():
             msg = f"{existing} exists already: remove it or choose another output folder"
             raise UsageError(msg)
+
+
+def _files(out: Path, kind: str) -> SimulatedRecording:
+    recording = out / ("recording.bag" if kind == "bag" else "recording")
+    require_no_recording(out)
     out.mkdir(parents=True, exist_ok=True)
     return SimulatedRecording(
         recording=recording,

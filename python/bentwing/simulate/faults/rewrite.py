@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""Write a recording and its payload again, with a fault."""
+
+from __future__ import annotations
+
+import shutil
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import yaml
+from rosbags.highlevel import AnyReader
+from rosbags.rosbag1 import Writer as Ros1Writer
+from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import Writer as Ros2Writer
+from rosbags.typesys import Stores, get_typestore
+
+from bentwing.base.errors import PayloadError, UsageError
+from bentwing.base.yaml_files import read_yaml
+from bentwing.simulate.faults.fault import Subject
+from bentwing.simulate.faults.messages import CLOUD, ENCODER, IMU, SCAN
+from bentwing.simulate.faults.registry import fault_of
+from bentwing.simulate.truth import write_yaml
+from bentwing.simulate.write import require_no_recording
+
+if TYPE_CHECKING:
+    from rosbags.typesys.store import Typestore
+
+    from bentwing.simulate.faults.fault import Changes, Edit
+
+_TRUTH = ("truth_trajectory.txt", "truth_scene.ply", "truth_georeference.yaml", "scenario.yaml")
+
+
+def with_fault(
+    recording: Path | str, payload: Path | str, fault: str, out: Path | str, *, seed: int = 0
+) -> tuple[Path, Path]:
+    """Write a recording as a head writes it that has a fault; all other bytes stay as they are.
+
+    Truth beside the recording is copied: it is that of the head without the fault. Some faults
+    need it. `truth_calibration.yaml` names the fault.
+
+    Parameters
+    ----------
+    recording : ROS 1 bag file or ROS 2 bag folder
+    payload : payload.yaml of the head
+    fault : name, one of `FAULTS`
+    out : folder for the new recording, its payload.yaml and the truth
+    seed : of what the fault draws
+
+    Returns
+    -------
+    The new recording and the new payload.yaml.
+
+    Raises
+    ------
+    UsageError
+        If there is no such fault, it cannot be put into this recording, or `out` has one already.
+    """
+    source, folder = Path(recording), Path(out)
+    target, described = _targets(source, folder)
+    content = _payload(Path(payload))
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    with AnyReader([source], default_typestore=store) as reader:
+        rng = np.random.default_rng([seed, *fault.encode()])
+        subject = Subject(reader, source.parent, rng)
+        changes = fault_of(fault).change(subject)
+        _require_sensors(changes, content)
+        _rewrite(subject, changes, target)
+    if changes.payload is not None:
+        changes.payload(content)
+    write_yaml(described, content)
+    _copy_truth(source.parent, folder, fault)
+    return target, described
+
+
+def _targets(source: Path, out: Path) -> tuple[Path, Path]:
+    target = out / ("recording.bag" if source.is_file() else "recording")
+    require_no_recording(out)
+    out.mkdir(parents=True, exist_ok=True)
+    return target, out / "payload.yaml"
+
+
+def _payload(path: Path) -> dict[str, Any]:
+    content = read_yaml(path, "give the payload.yaml of the head", PayloadError)
+    if not isinstance(content, dict):
+        msg = f"{path}: expected a mapping of sections, found {type(content).__name__}"
+        raise PayloadError(msg)
+    return content
+
+
+def _require_sensors(changes: Changes, payload: dict[str, Any]) -> None:
+    if changes.encoder is not None and changes.lidar is None and "encoder" not in payload:
+        msg = "this fault is one of an encoder, and the payload describes none"
+        raise UsageError(msg)
+
+
+def _rewrite(subject: Subject, changes: Changes, target: Path) -> None:
+    edits = {
+        IMU: changes.imu,
+        ENCODER: changes.encoder,
+        SCAN: changes.lidar,
+        CLOUD: changes.lidar,
+    }
+    with ExitStack() as stack:
+        writer = _Writer(stack, subject, target)
+        for connection, stamp, raw in subject.reader.messages():
+            writer.write(connection, stamp, raw, edits.get(connection.msgtype))
+
+
+class _Writer:
+    """Writes in the source's own format; a topic's type is that of its first message."""
+
+    def __init__(self, stack: ExitStack, subject: Subject, target: Path) -> None:
+        self._subject, self._reader = subject, subject.reader
+        self._connections: dict[int, Any] = {}
+        self._writer: Any
+        if not self._reader.is2:
+            self._writer = stack.enter_context(Ros1Writer(target))
+            return
+        is_sqlite = any(Path(str(self._reader.paths[0])).glob("*.db3"))
+        plugin = StoragePlugin.SQLITE3 if is_sqlite else StoragePlugin.MCAP
+        self._writer = stack.enter_context(Ros2Writer(target, version=9, storage_plugin=plugin))
+
+    def write(self, connection: Any, stamp: int, raw: bytes, edit: Edit | None) -> None:  # noqa: ANN401
+        """Append a message, changed by the edit if there is one."""
+        kind = connection.msgtype
+        if edit is not None:
+            message = edit(self._reader.deserialize(raw, kind))
+            if message is None:
+                return
+            kind = message.__msgtype__
+            types = self._types_with(kind)
+            encode = types.serialize_cdr if self._reader.is2 else types.serialize_ros1
+            raw = bytes(encode(message, kind))
+        if connection.id not in self._connections:
+            types = self._types_with(kind)
+            new = self._writer.add_connection(connection.topic, kind, typestore=types)
+            self._connections[connection.id] = new
+        self._writer.write(self._connections[connection.id], stamp, raw)
+
+    def _types_with(self, kind: str) -> Typestore:
+        own = self._reader.typestore
+        return own if kind in own.types else self._subject.standard_types
+
+
+def _copy_truth(source: Path, out: Path, fault: str) -> None:
+    for name in _TRUTH:
+        if (source / name).exists():
+            shutil.copyfile(source / name, out / name)
+    known = source / "truth_calibration.yaml"
+    truth = yaml.safe_load(known.read_text(encoding="utf-8")) if known.exists() else {}
+    write_yaml(out / known.name, {**truth, "fault": fault})

@@ -125,7 +125,7 @@ def close(job: Job, found: Found) -> Found:
         estimate=closed.estimate,
         loop_closure=closed.record,
         stage_warnings=(*found.stage_warnings, *closed.warnings),
-        evidence=(*found.evidence, *judge_closing(closed.record, open_loop.trajectory)),
+        evidence=(*found.evidence, *judge_closing(closed.record, [open_loop])),
     )
 
 

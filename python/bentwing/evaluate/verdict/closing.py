@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bentwing.evaluate.verdict.evidence import Evidence
+from bentwing.evaluate.verdict.usual import usual_of
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
-    from bentwing.base.trajectory import Trajectory
+    from bentwing.base.estimate import Estimate
     from bentwing.evaluate.revisits import Revisits
 
 # What closing moves is compared with no shorter path, m.
@@ -22,21 +23,23 @@ _OFFSET = 0.01
 _FEWEST = 50  # patches that were visited twice
 
 
-def judge_closing(record: Mapping[str, Any] | None, trajectory: Trajectory) -> list[Evidence]:
+def judge_closing(
+    record: Mapping[str, Any] | None, estimates: Sequence[Estimate]
+) -> list[Evidence]:
     """Judge by how much of what was seen again agrees, and by how far it moved the trajectory.
 
     Parameters
     ----------
     record : of the closing, as run.json has it; None if it was not asked for
-    trajectory : before it
+    estimates : before it
     """
     if not record or not record.get("n_revisits", record.get("n_stretch_pairs")):
         return []
     found = [Evidence("loop", 1.0 - float(record["inlier_share"]))]
     if record.get("applied"):
         moved = float(record["largest_translation"])
-        length = max(_length_of(trajectory), _SHORTEST)
-        found.append(Evidence("correction", moved / length, (), {"moved": moved}))
+        usual = max(_usual_drift(estimate) for estimate in estimates)
+        found.append(Evidence("correction", moved / usual, (), {"moved": moved}))
     return found
 
 
@@ -54,7 +57,9 @@ def judge_revisits(found: Revisits | None, sigma: float) -> list[Evidence]:
     return [Evidence("revisits", found.std / expected, (), {"millimetres": 1e3 * found.median})]
 
 
-def _length_of(trajectory: Trajectory) -> float:
-    """Length of the way, m, from positions half a second apart, so that vibration does not count."""
-    steps = trajectory.positions[::50]
-    return float(np.linalg.norm(np.diff(steps, axis=0), axis=1).sum())
+def _usual_drift(estimate: Estimate) -> float:
+    """How far an open-loop trajectory usually drifts, m."""
+    # Half a second apart, so that vibration does not count.
+    steps = np.diff(estimate.trajectory.positions[::50], axis=0)
+    length = float(np.linalg.norm(steps, axis=1).sum())
+    return usual_of(estimate.windows).drift * max(length, _SHORTEST)

@@ -57,9 +57,16 @@ class ImuSamples:
         return self._n_repeated / self.n if self.n else 0.0
 
     @property
+    def constant(self) -> tuple[str, ...]:
+        """Names of the instruments that have given one value all the time."""
+        extent = (self._ends[0] + self._ends[1]).reshape(2, 3).max(axis=1)
+        names = zip(("gyro", "accelerometer"), extent, strict=True)
+        return tuple(name for name, far in names if self.n > 1 and far == 0.0)
+
+    @property
     def limits(self) -> tuple[float, float]:
         """Share of the samples of the gyro and of the accelerometer that stay at an end of an axis."""
-        beyond = np.abs(self._ends) > _LEAST_LIMIT
+        beyond = (np.abs(self._ends) > _LEAST_LIMIT) & (self._ends[0] > -self._ends[1])
         shares = np.where(beyond, self._n_at_end, 0).max(axis=0) / max(self.n, 1)
         # Samples that repeat altogether are no limit.
         gyro, accel = np.maximum(shares - self.repeated_share, 0.0).reshape(2, 3).max(axis=1)

@@ -13,6 +13,7 @@ from bentwing.base.calibration import STANDARD_GRAVITY
 from bentwing.closing.global_registration.biases import drift_of, has_inertial_states
 from bentwing.evaluate.verdict.evidence import Evidence
 from bentwing.evaluate.verdict.stretches import over_time
+from bentwing.evaluate.verdict.usual import usual_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from bentwing.base.estimate import Estimate
     from bentwing.base.trajectory import Trajectory
     from bentwing.evaluate.verdict.inertial_track import InertialTrack
+    from bentwing.evaluate.verdict.usual import Usual
     from bentwing.recording.payload import Imu
 
     Array = NDArray[np.float64]
@@ -29,9 +31,6 @@ if TYPE_CHECKING:
 STEP = 0.5
 """s, over which turns and changes of velocity are compared."""
 _SAMPLES = 50
-# What the poses themselves may be off, of a good trajectory: half a milliradian and some millimetres
-# at both ends of a step.
-_RATE_FLOOR, _FORCE_FLOOR = 1e-3, 0.05
 _FEWEST = 6  # steps that say something
 
 
@@ -57,7 +56,7 @@ def judge_inertial(estimate: Estimate, track: InertialTrack, imu: Imu | None) ->
     """Compare the trajectory with the inertial samples, in units of what both are usually off."""
     if imu is None:
         return []
-    sigmas = _Sigmas.of(imu)
+    sigmas = _Sigmas.of(imu, usual_of(estimate.windows))
     parts = [_steps(part, estimate, track, sigmas) for part in _covered(estimate, track)]
     if sum(len(part.times) for part in parts) < _FEWEST:
         return []
@@ -81,11 +80,11 @@ class _Sigmas:
     force: float
 
     @classmethod
-    def of(cls, imu: Imu) -> _Sigmas:
+    def of(cls, imu: Imu, usual: Usual) -> _Sigmas:
         # A second difference weights the force like a triangle of two steps.
         force = imu.accel_noise * np.sqrt(2.0 / 3.0 / STEP)
         rate = imu.gyro_noise / np.sqrt(STEP)
-        return cls(float(np.hypot(rate, _RATE_FLOOR)), float(np.hypot(force, _FORCE_FLOOR)))
+        return cls(float(np.hypot(rate, usual.rate)), float(np.hypot(force, usual.force)))
 
 
 def _evidence(

@@ -65,7 +65,9 @@ def _judge_samples(watch: Watch) -> list[Evidence]:
 
 def _judge_imu(imu: ImuSamples) -> list[Evidence]:
     gyro, accel = imu.limits
+    constant = [Evidence("constant", 1.0, (), {"instrument": name}) for name in imu.constant]
     return [
+        *constant,
         Evidence("repeated", imu.repeated_share),
         Evidence("gyro_limit", gyro),
         Evidence("accelerometer_limit", accel),

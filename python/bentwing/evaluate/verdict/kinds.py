@@ -52,6 +52,11 @@ KINDS: dict[str, Kind] = {
         "{problem}",
         "then map again",
     ),
+    "constant": Kind(
+        0, 0.5, 0.5,
+        "the {instrument} gives the same value all the time",
+        "switch it on in the driver, and record again",
+    ),
     "repeated": Kind(
         0, 0.05, 0.2,
         "{percent:.0f} % of the IMU's samples only repeat the one before",
@@ -88,14 +93,19 @@ KINDS: dict[str, Kind] = {
         "check its unit, its scale and whether the driver removes gravity",
     ),
     "matches": Kind(
-        5, 0.03, 0.2,
-        "{percent:.0f} % of the surfaces seen again do not fit the trajectory{when}",
+        5, 3.0, 20.0,
+        "{share:.0f} % of the surfaces seen again do not fit the trajectory{when}",
         _HEAD,
     ),
     "lost": Kind(
         6, 0.1, 0.25,
         "for {seconds:.0f} s{when} the lidar sees nothing that fits what it saw before",
         _HEAD,
+    ),
+    "unseen": Kind(
+        11, 4.0, _NEVER,
+        "for {value:.0f} s the surroundings show too little structure to tell where the lidar is",
+        "compare the map before and after, and fly there with more structure in view",
     ),
     "loop": Kind(
         6, 0.03, 0.15,
@@ -124,7 +134,7 @@ KINDS: dict[str, Kind] = {
         "compare the calibration in the report with the drawing of the head, and correct payload.yaml",
     ),
     "correction": Kind(
-        11, 0.02, 0.2,
+        11, 2.0, 20.0,
         "closing the loops moved the trajectory by {moved:.2f} m, more than it usually drifts",
         "look for doubled walls in the report",
     ),

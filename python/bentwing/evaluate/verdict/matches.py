@@ -10,6 +10,7 @@ import numpy as np
 from bentwing.base.spans import spans_of
 from bentwing.evaluate.verdict.evidence import Evidence
 from bentwing.evaluate.verdict.stretches import over_time
+from bentwing.evaluate.verdict.usual import usual_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
 SETTLING = 4.0
 # Fewer matches tell nothing of where the lidar is; good windows have thousands, sweeps hundreds.
 FEWEST = 30
+# So little of what windows see tells the position in one direction.
+_BLIND = 0.01
 # A record speaks for no more than this, s, however long the recording was silent before.
 _LONGEST = 1.5
 
@@ -40,7 +43,7 @@ def judge_matches(windows: Sequence[WindowRecord]) -> list[Evidence]:
     spans = tuple(spans_of((w.time, bool(_is_lost(w))) for w in settled))
     share = float(seconds[lost].sum() / seconds.sum())
     found = [Evidence("lost", share, spans, {"seconds": float(seconds[lost].sum())})]
-    return [*found, *_agreement(settled, ~lost, seconds)]
+    return [*found, *_agreement(settled, ~lost, seconds), *_unseen(settled, seconds)]
 
 
 def _is_lost(window: WindowRecord) -> bool:
@@ -64,7 +67,18 @@ def _agreement(
     if not known:
         return []
     times, outliers, weights = np.array(known).T
+    usual = usual_of(windows).outliers
     found = over_time(times, outliers, weights)
-    median = float(np.median(outliers))
-    spans = found.spans_over("matches", lambda share: share)
-    return [Evidence("matches", found.high, spans, {"median": median})]
+    spans = found.spans_over("matches", lambda share: share / usual)
+    return [Evidence("matches", found.high / usual, spans, {"share": 100 * found.high})]
+
+
+def _unseen(windows: Sequence[WindowRecord], seconds: NDArray[np.float64]) -> list[Evidence]:
+    """Judge by the longest time, s, in which windows leave a direction of the position unseen."""
+    longest = now = 0.0
+    for window, length in zip(windows, seconds.tolist(), strict=True):
+        seen = window.translation_eigenvalues
+        is_blind = window.registered is None and seen is not None and min(seen) < _BLIND
+        now = now + length if is_blind else 0.0
+        longest = max(longest, now)
+    return [Evidence("unseen", longest)]

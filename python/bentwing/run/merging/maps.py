@@ -198,7 +198,7 @@ def _one_map(
         map=written,
         runs=runs,
         stage_warnings=tuple(notes),
-        evidence=(*judge_closing(closing, trajectory), *judge_revisits(written.revisits, sigma)),
+        evidence=(*judge_closing(closing, placed), *judge_revisits(written.revisits, sigma)),
         judged=tuple(reason for source in sources for reason in source.reasons),
     )
     say_warnings(found.progress, [note for note in notes if note not in found.said])

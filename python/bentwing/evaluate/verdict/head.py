@@ -9,6 +9,7 @@ import numpy as np
 
 from bentwing.base import geometry
 from bentwing.base.mount import FixedMount, MotorMount
+from bentwing.base.trajectory import DT
 from bentwing.evaluate.verdict.evidence import Evidence
 from bentwing.odometry.continuous.slow_states import initial_std
 from bentwing.recording.described import described_calibration
@@ -36,8 +37,10 @@ _STATES = {
     "motor_tilt": "the direction of the lidar on the motor",
     "motor_offset": "the place of the lidar on the motor",
 }
-# A drift of clocks is judged over at least so long, s.
+# A drift of clocks and the turning of a plane are judged over at least so long, s.
 _SHORTEST = 10.0
+# So far from its first pose a carrier moves, m, and about that in rad.
+_AWAY = 0.1
 
 
 def judge_calibration(found: Calibration, payload: Payload) -> list[Evidence]:
@@ -74,12 +77,20 @@ def judge_slice(trajectory: Trajectory, found: Calibration, normal: Array | None
     """
     if normal is None or not isinstance(found.mount, FixedMount):
         return []
-    normals = geometry.rotate(
-        trajectory.quats_xyzw,
-        np.broadcast_to(found.mount.T_imu_lidar.R @ normal, trajectory.positions.shape),
-    )
+    quats = trajectory.quats_xyzw[_moving(trajectory)]
+    if len(quats) * DT < _SHORTEST:
+        return []
+    plane = np.broadcast_to(found.mount.T_imu_lidar.R @ normal, (len(quats), 3))
+    normals = geometry.rotate(quats, plane)
     spread = np.linalg.eigvalsh(normals.T @ normals / len(normals))
     return [Evidence("slice", float(spread[2]))]
+
+
+def _moving(trajectory: Trajectory) -> slice:
+    """Return the poses behind the rest at the start."""
+    away = np.linalg.norm(trajectory.positions - trajectory.positions[0], axis=1) > _AWAY
+    away |= 1.0 - np.abs(trajectory.quats_xyzw @ trajectory.quats_xyzw[0]) > _AWAY**2
+    return slice(int(np.argmax(away)) if away.any() else len(away), None)
 
 
 def _offsets(found: Calibration, described: Calibration) -> dict[str, Array]:

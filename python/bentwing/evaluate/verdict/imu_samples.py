@@ -47,9 +47,14 @@ class ImuSamples:
         self.last = max(self.last, float(batch.times[-1]))
 
     @property
+    def length(self) -> float:
+        """Time from the first sample to the last, s."""
+        return max(self.last - self.first, 0.0)
+
+    @property
     def period(self) -> float:
         """Mean time between samples, s."""
-        return (self.last - self.first) / (self.n - 1) if self.n > 1 else np.inf
+        return self.length / (self.n - 1) if self.n > 1 else np.inf
 
     @property
     def repeated_share(self) -> float:

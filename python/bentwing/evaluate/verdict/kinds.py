@@ -114,7 +114,7 @@ KINDS: dict[str, Kind] = {
         _HEAD,
     ),
     "gyro": Kind(
-        7, 1.5, 6.0,
+        7, 2.0, 6.0,
         "the trajectory turns otherwise than the gyro says, by {degrees:.2f} °/s{when}",
         "check T_imu_lidar, the gyro's axes and scale, and the clocks",
     ),

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 # One of so many returns is looked at.
 _EVERY = 37
+# A 3D lidar shows itself in the first batches.
+_JUDGED = 10
 _FEWEST = 3
 
 
@@ -29,15 +31,14 @@ class Returns:
 
     def __init__(self) -> None:
         self.normal: NDArray[np.float64] | None = None
-        self._is_planar: bool | None = None
+        self._n_judged = 0
         self._n = 0
         self._sums = np.zeros(2)
 
     def add(self, batch: LidarBatch) -> None:
         """Take the next returns."""
-        if self._is_planar is not False and len(batch.times) >= _FEWEST:
-            self._is_planar = is_plane(batch.points)
-            self.normal = _normal(batch.points) if self._is_planar else None
+        if self._n_judged < _JUDGED and len(batch.times) >= _FEWEST:
+            self._judge(batch.points)
         some = batch.points[::_EVERY]
         ranges = np.log(np.maximum(np.linalg.norm(some, axis=1), 1e-3))
         self._n += len(ranges)
@@ -51,7 +52,9 @@ class Returns:
         mean, square = self._sums / self._n
         return float(np.sqrt(max(square - mean**2, 0.0)))
 
-
-def _normal(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    normal: NDArray[np.float64] = np.linalg.svd(points - points.mean(axis=0))[2][2]
-    return normal
+    def _judge(self, points: NDArray[np.float64]) -> None:
+        self._n_judged += 1
+        if is_plane(points):
+            self.normal = np.linalg.eigh(np.cov(points.T))[1][:, 0]
+        else:
+            self.normal, self._n_judged = None, _JUDGED

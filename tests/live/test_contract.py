@@ -277,8 +277,10 @@ def swapped(gyro, accel):
 
 
 @pytest.mark.parametrize("wrong", [in_g, in_degrees, swapped])
-def test_an_imu_that_is_wrong_fails_within_ten_seconds_of_motion(new, flight, wrong):
-    odometry = new()
+def test_an_imu_that_is_wrong_fails_within_ten_seconds_of_motion(
+    new, simulated, read_flight, wrong
+):
+    odometry, flight = new(), read_flight(simulated("office", 22.0), length=15.0)
 
     def fly():
         for piece in flight.pieces:

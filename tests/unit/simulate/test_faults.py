@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import yaml
 from rosbags.highlevel import AnyReader
+from rosbags.rosbag1 import Reader, Writer
 from rosbags.typesys import Stores, get_typestore
 
 from bentwing.base import geometry
@@ -22,6 +23,7 @@ from bentwing.simulate.faults.rewrite import with_fault
 from bentwing.simulate.faults.simulation import simulate_with_fault
 from bentwing.simulate.names import FaultName
 
+ROS1 = get_typestore(Stores.ROS1_NOETIC)
 HEADS = ("hokuyo-spin", "vlp16-fixed", "vlp16-motor")
 DURATION = 0.8
 MOUNTS = [name for name in FAULTS if name.startswith("mount")]
@@ -416,7 +418,8 @@ def test_a_ros2_recording_keeps_its_format(kind, tmp_path):
 @pytest.mark.parametrize(
     ("name", "head", "sentence"),
     [
-        ("encoder-late", "vlp16-fixed", "an encoder, and the payload describes none"),
+        ("encoder-late", "vlp16-fixed", "the recording has no encoder"),
+        ("encoder-axis", "vlp16-fixed", "no motor's axis"),
         ("points-shuffled", "hokuyo-spin", "needs the points of a 3D lidar"),
         ("mount-upwards", "vlp16-fixed", "no fault is called mount-upwards"),
     ],
@@ -425,6 +428,24 @@ def test_a_fault_that_does_not_fit_is_refused(name, head, sentence, good, tmp_pa
     files, *_ = good(head)
     with pytest.raises(UsageError, match=sentence):
         with_fault(files.recording, files.payload, name, tmp_path)
+
+
+def test_a_bag_without_an_imu_has_no_gyro_to_fail(good, tmp_path):
+    files, *_ = good("vlp16-fixed")
+    alone = tmp_path / "recording.bag"
+    with Reader(files.recording) as reader, Writer(alone) as writer:
+        for connection, stamp, raw in reader.messages():
+            if connection.msgtype == messages.CLOUD:
+                key = connection.topic, connection.msgtype
+                known = {(c.topic, c.msgtype): c for c in writer.connections}
+                new = known.get(key) or writer.add_connection(*key, typestore=ROS1)
+                writer.write(new, stamp, raw)
+    (tmp_path / "payload.yaml").write_text("name: alone")
+    for name in ("gyro-zero", "gyro-saturated", "mount-90-x"):
+        with pytest.raises(UsageError, match=r"no (IMU|T_imu_lidar)"):
+            with_fault(alone, tmp_path / "payload.yaml", name, tmp_path / name)
+    recording, _ = with_fault(alone, tmp_path / "payload.yaml", "lidar-mirrored", tmp_path / "ok")
+    assert read(recording).raw["lidar"]
 
 
 def test_a_head_without_a_motor_has_no_encoder_to_fail():

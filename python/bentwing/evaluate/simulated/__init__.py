@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from bentwing.evaluate.simulated.in_world import WorldError, world_error
 from bentwing.evaluate.simulated.localized import LocalizedScore, localized_score
 from bentwing.evaluate.simulated.merged import MergedScore, merged_score
 from bentwing.evaluate.simulated.score import Score, score
@@ -18,10 +19,12 @@ __all__ = [
     "MergedScore",
     "Score",
     "Truth",
+    "WorldError",
     "in_flight",
     "localized_score",
     "mapped_points",
     "merged_score",
     "score",
     "true_calibration",
+    "world_error",
 ]

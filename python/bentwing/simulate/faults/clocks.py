@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from bentwing.simulate.faults.fault import Edit, Message, Repair
 
-CAUSE = r"clock|latency|stamp|late\b|early|delay|time"
+CAUSE = r"clock|latency|stamp|\b(late|early)\b|delay"
 FITTED = 1.0
 """s, up to which the clocks can be fitted to each other."""
 SINCE_POWER_ON = 47 * NS_PER_S

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, get_args
 
 import numpy as np
 from rosbags.typesys import Stores, get_typestore
@@ -14,6 +14,7 @@ from bentwing.base import geometry
 from bentwing.base.errors import UsageError
 from bentwing.base.trajectory import Trajectory, read_tum
 from bentwing.simulate.faults.messages import IMU, stamp_ns
+from bentwing.simulate.names import HeadName
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     from rosbags.highlevel import AnyReader
     from rosbags.typesys.store import Typestore
 
-    from bentwing.simulate.names import FaultName, HeadName
+    from bentwing.simulate.names import FaultName
 
 Message = Any
 """A message, made by `rosbags` at run time from ROS's own definitions."""
@@ -32,12 +33,11 @@ Edit: TypeAlias = "Callable[[Message], Message | None]"
 Repair = Literal["mount", "axes", "units", "latency", "mirrored", "encoder", "none"]
 """What would have to be found to map the recording all the same."""
 
-HANDHELD: tuple[HeadName, ...] = ("hokuyo-nod",)
-PLANAR: tuple[HeadName, ...] = ("hokuyo-spin", *HANDHELD)
+ALL: tuple[HeadName, ...] = get_args(HeadName)
+PLANAR: tuple[HeadName, ...] = ("hokuyo-spin", "hokuyo-nod")
 TURNED: tuple[HeadName, ...] = ("vlp16-motor",)
-SOLID: tuple[HeadName, ...] = ("vlp16-fixed", "vlp16-side", *TURNED)
+SOLID: tuple[HeadName, ...] = tuple(head for head in ALL if head not in PLANAR)
 """Heads with a 3D lidar."""
-ALL: tuple[HeadName, ...] = (*PLANAR, *SOLID)
 
 
 @dataclass(frozen=True)
@@ -67,6 +67,9 @@ class Subject:
     def imu(self) -> Iterator[Message]:
         """Yield the inertial messages, before the fault."""
         connections = [c for c in self.reader.connections if c.msgtype == IMU]
+        if not connections:
+            msg = f"the recording has no IMU ({IMU}) that this fault could change"
+            raise UsageError(msg)
         for connection, _, raw in self.reader.messages(connections):
             yield self.reader.deserialize(raw, connection.msgtype)
 

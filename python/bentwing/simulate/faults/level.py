@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bentwing.base.errors import UsageError
 from bentwing.simulate.faults.messages import SCAN, table, time_field
 
 if TYPE_CHECKING:
@@ -47,6 +48,9 @@ def level_scan(cloud: Any, types: Typestore) -> Any:  # noqa: ANN401 - made at r
 
 def _level_ring(rows: NDArray[np.void]) -> NDArray[np.void]:
     """Return the points of the ring nearest to the lidar's horizon, in time order."""
+    if not {"ring", "x", "y", "z"} <= set(rows.dtype.names or ()):
+        msg = f"this fault needs the ring of every point, the clouds have {rows.dtype.names}"
+        raise UsageError(msg)
     heights = np.abs(rows["z"]) / np.hypot(rows["x"], rows["y"])
     rings = np.unique(rows["ring"])
     level = min(rings, key=lambda ring: float(np.median(heights[rows["ring"] == ring])))

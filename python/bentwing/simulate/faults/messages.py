@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bentwing.base.errors import UsageError
 from bentwing.recording.messages.point_cloud2 import DATATYPES
 from bentwing.recording.point_times import NAMES as TIME_NAMES
 
@@ -115,4 +116,9 @@ def set_table(message: Any, rows: NDArray[np.void]) -> None:  # noqa: ANN401
 
 def time_field(rows: NDArray[np.void]) -> str:
     """Return the name of the field with the points' times."""
-    return next(name for name in rows.dtype.names or () if name.lower() in TIME_NAMES)
+    names = rows.dtype.names or ()
+    found = next((name for name in names if name.lower() in TIME_NAMES), None)
+    if found is None:
+        msg = f"this fault needs the time of every point, the clouds have {', '.join(names)}"
+        raise UsageError(msg)
+    return found

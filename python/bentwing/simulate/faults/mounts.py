@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bentwing.base import geometry
+from bentwing.base.errors import UsageError
 from bentwing.simulate.faults.fault import Changes, Fault, Subject
 
 if TYPE_CHECKING:
@@ -23,6 +24,9 @@ def _poses(payload: dict[str, Any]) -> list[dict[str, Any]]:
     """Return all poses of the payload; the first one is relative to the IMU."""
     if "encoder" in payload:
         return [payload["encoder"]["T_imu_motor"], payload["encoder"]["T_motor_lidar"]]
+    if "T_imu_lidar" not in payload:
+        msg = "the payload has no T_imu_lidar that this fault could change"
+        raise UsageError(msg)
     return [payload["T_imu_lidar"]]
 
 

@@ -65,17 +65,17 @@ def with_fault(
         rng = np.random.default_rng([seed, *fault.encode()])
         subject = Subject(reader, source.parent, rng)
         changes = fault_of(fault).change(subject)
-        _require_sensors(changes, content)
+        _require_sensors(changes, reader)
+        if changes.payload is not None:
+            changes.payload(content)
         _rewrite(subject, changes, target)
-    if changes.payload is not None:
-        changes.payload(content)
     write_yaml(described, content)
     _copy_truth(source.parent, folder, fault)
     return target, described
 
 
 def _targets(source: Path, out: Path) -> tuple[Path, Path]:
-    target = out / ("recording.bag" if source.is_file() else "recording")
+    target = out / ("recording.bag" if source.suffix == ".bag" else "recording")
     require_no_recording(out)
     out.mkdir(parents=True, exist_ok=True)
     return target, out / "payload.yaml"
@@ -89,10 +89,21 @@ def _payload(path: Path) -> dict[str, Any]:
     return content
 
 
-def _require_sensors(changes: Changes, payload: dict[str, Any]) -> None:
-    if changes.encoder is not None and changes.lidar is None and "encoder" not in payload:
-        msg = "this fault is one of an encoder, and the payload describes none"
-        raise UsageError(msg)
+def _require_sensors(changes: Changes, reader: AnyReader) -> None:
+    """Refuse a fault of a sensor that the recording does not have."""
+    present = {connection.msgtype for connection in reader.connections}
+    # The encoder has the lidar's clock, but a fault of the clock needs no encoder.
+    is_of_encoder = changes.encoder is not None and changes.lidar is None
+    for sensor, is_needed, types in (
+        ("IMU", changes.imu is not None, (IMU,)),
+        ("encoder", is_of_encoder, (ENCODER,)),
+        ("lidar", changes.lidar is not None, (SCAN, CLOUD)),
+    ):
+        if is_needed and present.isdisjoint(types):
+            msg = (
+                f"the recording has no {sensor} ({' or '.join(types)}) that this fault could change"
+            )
+            raise UsageError(msg)
 
 
 def _rewrite(subject: Subject, changes: Changes, target: Path) -> None:
@@ -109,11 +120,11 @@ def _rewrite(subject: Subject, changes: Changes, target: Path) -> None:
 
 
 class _Writer:
-    """Writes in the source's own format; a topic's type is that of its first message."""
+    """Writes in the source's own format."""
 
     def __init__(self, stack: ExitStack, subject: Subject, target: Path) -> None:
         self._subject, self._reader = subject, subject.reader
-        self._connections: dict[int, Any] = {}
+        self._connections: dict[tuple[str, str], Any] = {}
         self._writer: Any
         if not self._reader.is2:
             self._writer = stack.enter_context(Ros1Writer(target))
@@ -133,11 +144,11 @@ class _Writer:
             types = self._types_with(kind)
             encode = types.serialize_cdr if self._reader.is2 else types.serialize_ros1
             raw = bytes(encode(message, kind))
-        if connection.id not in self._connections:
+        key = connection.topic, kind
+        if key not in self._connections:
             types = self._types_with(kind)
-            new = self._writer.add_connection(connection.topic, kind, typestore=types)
-            self._connections[connection.id] = new
-        self._writer.write(self._connections[connection.id], stamp, raw)
+            self._connections[key] = self._writer.add_connection(*key, typestore=types)
+        self._writer.write(self._connections[key], stamp, raw)
 
     def _types_with(self, kind: str) -> Typestore:
         own = self._reader.typestore

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bentwing.base.errors import UsageError
 from bentwing.simulate.faults.fault import TURNED, Changes, Fault, Subject
 from bentwing.simulate.faults.messages import NS_PER_S, set_stamp, stamp_ns
 
@@ -47,6 +48,9 @@ def _other_axis(_: Subject) -> Changes:
     """Put the motor's axis where the next one of its frame is."""
 
     def payload(content: dict[str, Any]) -> None:
+        if "axis" not in content.get("encoder", {}):
+            msg = "the payload describes no motor's axis that this fault could change"
+            raise UsageError(msg)
         content["encoder"]["axis"] = np.roll(content["encoder"]["axis"], 1).tolist()
 
     return Changes(payload=payload)

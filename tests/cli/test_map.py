@@ -70,7 +70,9 @@ def test_the_start_of_a_good_flight_is_a_note_and_no_warning(mapped):
     (note,) = record["notes"]
     assert note.startswith("the head had turned once by ")
     page = (out / "report.html").read_text()
-    assert "Map finished, no warnings" in page
+    assert record["verdict"]["state"] == "good"
+    assert record["verdict"]["reasons"] == []
+    assert "Good: all that was checked agrees" in page
     assert f"Note: {note}." in page
 
 

@@ -61,7 +61,8 @@ def test_a_mapped_flight_is_left_alone_unless_it_is_asked_for_with_other_setting
     said = bentwing(*command)
     assert said.code == 0, said.err
     assert said.err.count("is mapped already") == 2
-    assert said.out == f"{site}: {flights[0].name}, {flights[1].name}; open {site}/report.html\n"
+    names = f"{flights[0].name}, {flights[1].name}"
+    assert said.out == f"{site}: {names}; good; open {site}/report.html\n"
     assert record_of(site / "runs" / flights[0].name)["timings"] == before
     said = bentwing(*command, "--set", "window=4")
     assert said.code == 0, said.err
@@ -75,7 +76,7 @@ def test_runs_are_merged_into_one_map(site, flights, bentwing, tmp_path):
     runs, out = [site / "runs" / folder.name for folder in flights], tmp_path / "merged"
     said = bentwing("merge", *runs, "-o", out, *THIN)
     assert said.code == 0, said.err
-    assert said.out == f"{out}: {runs[0].name}, {runs[1].name}; open {out}/report.html\n"
+    assert said.out == f"{out}: {runs[0].name}, {runs[1].name}; good; open {out}/report.html\n"
     assert "survey" in said.err
     assert (out / "map.laz").read_bytes() == (site / "map.laz").read_bytes()
 
@@ -88,7 +89,7 @@ def test_a_recording_is_localized_in_the_map_of_another_flight(site, flights, be
         "-p", second / "payload.yaml", "-o", out, *THIN,
     )  # fmt: skip
     assert said.code == 0, said.err
-    assert said.out == f"{out}: open {out}/report.html\n"
+    assert said.out == f"{out}: good; open {out}/report.html\n"
     assert {"trajectory.txt", "map.laz", "appeared.laz", "disappeared.laz", "run.json"} <= names_in(
         out
     )

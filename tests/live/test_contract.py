@@ -264,6 +264,39 @@ def test_a_failure_is_told_to_who_feeds_and_to_who_reads(new, flight, monkeypatc
     assert len(odometry.trajectory.times)  # what was estimated until then
 
 
+def in_g(gyro, accel):
+    return gyro, accel / 9.80665
+
+
+def in_degrees(gyro, accel):
+    return np.degrees(gyro), accel
+
+
+def swapped(gyro, accel):
+    return gyro[:, [1, 0, 2]], accel[:, [1, 0, 2]]
+
+
+@pytest.mark.parametrize("wrong", [in_g, in_degrees, swapped])
+def test_an_imu_that_is_wrong_fails_within_ten_seconds_of_motion(
+    new, simulated, read_flight, wrong
+):
+    odometry, flight = new(), read_flight(simulated("office", 22.0), length=15.0)
+
+    def fly():
+        for piece in flight.pieces:
+            if isinstance(piece, ImuBatch):
+                gyro, accel = wrong(piece.gyro, piece.accel)
+                piece = ImuBatch(piece.times, gyro, accel)
+            odometry.feed(piece)
+            odometry.wait()
+
+    with pytest.raises(DivergedError, match="the estimate is wrong: "):
+        fly()
+    assert odometry.status == "failed"
+    with pytest.raises(DivergedError, match="the estimate is wrong: "):
+        odometry.pose()
+
+
 def test_a_closed_odometry_can_be_read_but_not_fed(new, flight):
     with new() as odometry:
         for piece in until(flight.pieces, 8.0):

@@ -24,7 +24,7 @@ _EXIT_CODES = """\
   0    done
   2    the call is wrong
   3    an input cannot be used, or a recording is unfit for mapping
-  4    the estimation failed; what was computed is kept
+  4    the estimation failed, or the map is wrong; what was computed is kept
   130  interrupted; what was computed is kept"""
 
 

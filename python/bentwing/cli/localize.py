@@ -65,6 +65,5 @@ def command(
     )
     chosen = choose(settings, set_, payload, options_given)
     progress = create_progress(quiet=quiet)
-    run_recording(recording, out, chosen, payload, resume=resume, progress=progress)
-    if not quiet:
-        say_run(out)
+    found = run_recording(recording, out, chosen, payload, resume=resume, progress=progress)
+    say_run(out, found.verdict, quiet=quiet)

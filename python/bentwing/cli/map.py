@@ -96,11 +96,9 @@ def command(
             )
             raise UsageError(msg)
         merged = map_flights(flights, out, chosen, payload, resume=resume, progress=progress)
-        if not quiet:
-            say_maps(merged)
+        say_maps(merged, quiet=quiet)
         return
     found = run_recording(recording, out, chosen, payload, resume=resume, progress=progress)
     if write_payload is not None and found.estimate is not None:
         with_motion(chosen.payload, found.estimate.calibration).save(write_payload)
-    if not quiet:
-        say_run(out)
+    say_run(out, found.verdict, quiet=quiet)

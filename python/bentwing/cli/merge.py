@@ -51,5 +51,4 @@ def command(
         threads=threads,
         progress=create_progress(quiet=quiet),
     )
-    if not quiet:
-        say_maps(merged)
+    say_maps(merged, quiet=quiet)

@@ -24,6 +24,8 @@ DASH, TIMES = "\N{EN DASH}", "\N{MULTIPLICATION SIGN}"
 
 def verdict(record: Mapping[str, Any]) -> str:
     """State in one box whether the result can be used as it is."""
+    found = record.get("verdict") or {}
+    reasons = [f"{r['sentence']}: {r['advice']}" for r in found.get("reasons") or []]
     warnings = [str(warning) for warning in record.get("warnings") or []]
     if not record.get("complete", False):
         stage, reason = record.get("stage", "?"), record.get("reason") or "not finished"
@@ -31,20 +33,23 @@ def verdict(record: Mapping[str, Any]) -> str:
         sentence = (
             f"The run stopped in the stage “{stage}”: {reason}. What was done until then is kept."
         )
-    elif warnings:
-        plural = "s" if len(warnings) > 1 else ""
-        level, headline = "warn", f"Map finished, with {len(warnings)} warning{plural}"
-        sentence = f"Read {'these' if plural else 'this'} before using the map:"
     else:
-        level, headline = "good", "Map finished, no warnings"
-        sentence = _quality(record.get("windows") or [])
-    items = "".join(f"<li>{escape(warning)}</li>" for warning in warnings)
+        state = found.get("state", "good")
+        level = {"good": "good", "doubtful": "warn", "failed": "bad"}[state]
+        headline = found.get("headline") or "Map finished"
+        sentence = "" if reasons else _quality(record.get("windows") or [])
+    items = "".join(f"<li>{escape(_capital(reason))}.</li>" for reason in reasons)
     listed = f"<ul>{items}</ul>" if items else ""
+    if warnings:
+        items = "".join(f"<li>{escape(warning)}</li>" for warning in warnings)
+        listed += f"<p>Worth knowing:</p><ul>{items}</ul>"
     listed += "".join(f"<p>Note: {escape(str(note))}.</p>" for note in record.get("notes") or [])
-    return (
-        f'<div class="verdict {level}"><strong>{escape(headline)}</strong>'
-        f"<p>{escape(sentence)}</p>{listed}</div>"
-    )
+    said = f"<p>{escape(sentence)}</p>" if sentence else ""
+    return f'<div class="verdict {level}"><strong>{escape(headline)}</strong>{said}{listed}</div>'
+
+
+def _capital(sentence: str) -> str:
+    return sentence[:1].upper() + sentence[1:]
 
 
 def _quality(windows: Sequence[Mapping[str, Any]]) -> str:

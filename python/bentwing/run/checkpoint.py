@@ -22,6 +22,7 @@ from bentwing.base.estimate import Estimate
 from bentwing.base.plain import plain
 from bentwing.base.trajectory import Trajectory
 from bentwing.base.window_record import WindowRecord
+from bentwing.evaluate.verdict import Evidence
 from bentwing.run.found import Found, Reading, Spin
 
 if TYPE_CHECKING:
@@ -61,6 +62,7 @@ class Checkpoint:
             "reading": found.reading,
             "corrections": {name: getattr(found, name) for name in _CORRECTIONS},
             "stage_warnings": found.stage_warnings,
+            "evidence": found.evidence,
             "timings": record.timings,
             "files": [name for name in record.files if name != NAME],
         }
@@ -147,4 +149,5 @@ def _found(arrays: dict[str, Any], described: dict[str, Any]) -> Found:
         Spin([(time, rate) for time, rate in arrays["spin"].tolist()]),
         **described["corrections"],
         stage_warnings=tuple(described["stage_warnings"]),
+        evidence=tuple(Evidence.from_json(one) for one in described.get("evidence") or []),
     )

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
+from bentwing.evaluate.verdict import Verdict, judge_breaks, verdict_of
 from bentwing.map.sample import MapSample
 from bentwing.recording import ImuBatch
 
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
     from bentwing.base.estimate import Estimate
     from bentwing.closing.georeference.georeference import Georeferenced
     from bentwing.closing.localize import GivenCoordinates
+    from bentwing.evaluate.revisits import Revisits
+    from bentwing.evaluate.verdict import Evidence, Reason
     from bentwing.recording import Batch
 
     Placed: TypeAlias = Georeferenced | GivenCoordinates
@@ -69,6 +72,7 @@ class WrittenMap:
     counts : points that were projected, left out and written
     record : how it was cleaned, for run.json
     sample : evenly chosen points, in the frame of the trajectory
+    revisits : how well they agree that were seen twice, if any were
     change : points that have appeared and disappeared since the prior map, for run.json
     """
 
@@ -76,6 +80,7 @@ class WrittenMap:
     counts: dict[str, int]
     record: dict[str, Any]
     sample: MapSample
+    revisits: Revisits | None = None
     change: dict[str, int] | None = None
 
 
@@ -93,6 +98,10 @@ class Found:
     map : the map
     runs : of a merged map, the runs in it, for run.json
     stage_warnings : sentences of the stages behind the estimate
+    evidence : by which the result is judged
+    judged : of a merged map, what speaks against the runs in it
+    set_up : the head as the recording shows it, where that is other than the payload says
+    doubt : why the estimate was stopped before its end
     failure : why the last stage did not finish
     """
 
@@ -106,12 +115,22 @@ class Found:
     map: WrittenMap | None = None
     runs: tuple[Record, ...] = ()
     stage_warnings: tuple[str, ...] = ()
+    evidence: tuple[Evidence, ...] = ()
+    judged: tuple[Reason, ...] = ()
+    set_up: SetUp | None = None
+    doubt: Verdict | None = None
     failure: BaseException | None = None
 
     @property
     def sample(self) -> MapSample:
         """Evenly chosen points of the map; none before there is one."""
         return MapSample() if self.map is None else self.map.sample
+
+    @property
+    def verdict(self) -> Verdict:
+        """Whether the result can be used, by what is known so far."""
+        breaks = [] if self.estimate is None else judge_breaks(self.estimate.breaks)
+        return verdict_of([*self.evidence, *breaks], self.judged)
 
     @property
     def warnings(self) -> list[str]:
@@ -138,6 +157,8 @@ class Found:
             localization = {**localization, **written.change}
         return {
             "counts": counts,
+            "verdict": self.verdict,
+            "set_up": [] if self.set_up is None else self.set_up.findings,
             "warnings": self.warnings,
             "notes": [] if estimate is None else estimate.notes,
             "calibration": None if estimate is None else estimate.calibration,

@@ -11,6 +11,7 @@ import numpy as np
 
 from bentwing.base.clock import NS_PER_S
 from bentwing.base.trajectory import Trajectory
+from bentwing.evaluate.revisits import revisit_consistency
 from bentwing.map.chunk import untimed
 from bentwing.map.clean import clean
 from bentwing.map.sample import MapSample
@@ -95,14 +96,16 @@ def write_map(
             times = chunk.times + late[chunk.run_id] if late.any() else chunk.times
             writer.write(replace(chunk, points=_projected(chunk.points, placed), times=times))
     counts["map.written"] = writer.n_points
+    points = sample.points
+    revisits = revisit_consistency(points, sample.times) if len(points) else None
     if difference is None:
-        return WrittenMap(path, counts, record, sample)
+        return WrittenMap(path, counts, record, sample, revisits)
     clouds = {"appeared": difference.appeared, "disappeared": difference.disappeared}
     for name, points in clouds.items():
         changed = folder.file(f"{name}.{settings.map_format}")
         with _open(changed, settings, origin_ns, placed) as writer:
             writer.write(untimed(_projected(points, placed)))
-    return WrittenMap(path, counts, record, sample, difference.record)
+    return WrittenMap(path, counts, record, sample, revisits, difference.record)
 
 
 def follow_each_other(estimates: Sequence[Estimate]) -> list[float]:

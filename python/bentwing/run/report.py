@@ -59,6 +59,7 @@ def _write(
         run_json={**folder.described(), "complete": complete},
         trajectory=trajectory,
         map_sample=(points, times),
+        revisits=None if found.map is None else found.map.revisits,
         spin=found.spin.series,
     )
     if len(points):

@@ -13,6 +13,7 @@ from bentwing.base.estimate import Estimate
 from bentwing.base.run_record import read_record
 from bentwing.base.trajectory import DT, read_tum
 from bentwing.base.window_record import WindowRecord
+from bentwing.evaluate.verdict import Verdict, verdict_of
 from bentwing.odometry.segments import joined
 
 if TYPE_CHECKING:
@@ -32,6 +33,7 @@ class Run:
     ----------
     out : the run folder
     estimate : trajectory, calibration and diagnostics
+    verdict : whether the result can be used, and why not
     warnings : sentences about the health of the result
     map_path : the map
     report_path : the report
@@ -39,6 +41,7 @@ class Run:
 
     out: Path
     estimate: Estimate
+    verdict: Verdict
     warnings: tuple[str, ...]
     map_path: Path
     report_path: Path
@@ -54,7 +57,14 @@ class Run:
         if found.estimate is None or found.map is None:
             msg = "found: expected the result of all stages, got one without estimate or map"
             raise ValueError(msg)
-        return cls(out, found.estimate, tuple(found.warnings), found.map.path, out / "report.html")
+        return cls(
+            out,
+            found.estimate,
+            found.verdict,
+            tuple(found.warnings),
+            found.map.path,
+            out / "report.html",
+        )
 
     @classmethod
     def load(cls, out: Path | str) -> Run:
@@ -75,6 +85,7 @@ class Run:
         return cls(
             folder,
             estimate_of(folder, record),
+            verdict_in(record),
             tuple(record["warnings"]),
             folder / written,
             folder / "report.html",
@@ -91,6 +102,12 @@ def require_single(folder: Path, record: dict[str, Any]) -> dict[str, Any]:
         msg = f"{folder}: the run is not complete; finish it with `bentwing map ... --resume` first"
         raise UsageError(msg)
     return record
+
+
+def verdict_in(record: Mapping[str, Any]) -> Verdict:
+    """Return the verdict in a record; runs of earlier versions have none, and nothing speaks against them."""
+    described = record.get("verdict")
+    return Verdict.from_json(described) if described else verdict_of([])
 
 
 def estimate_of(folder: Path, record: Mapping[str, Any]) -> Estimate:

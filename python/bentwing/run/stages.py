@@ -4,19 +4,18 @@
 from __future__ import annotations
 
 from collections import Counter
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from bentwing.base.errors import EstimationError, NotEnoughDataError
+from bentwing.base.errors import NotEnoughDataError
 from bentwing.base.progress import Progress
-from bentwing.calibrate.carrier import CarrierWatch, carrier_warnings
 from bentwing.closing.georeference.georeference import georeference
 from bentwing.closing.global_registration import Budget, close_loops
 from bentwing.closing.joining.segments import close_segments
 from bentwing.closing.localize import Difference, NotInMapError, find_in_map
+from bentwing.evaluate.verdict import judge_closing, judge_revisits
 from bentwing.map.project import project
-from bentwing.run.found import Found, Reading, Spin
+from bentwing.run.first_pass import FirstPass
 from bentwing.run.mapping import MapSource, write_map
 
 if TYPE_CHECKING:
@@ -29,6 +28,7 @@ if TYPE_CHECKING:
     from bentwing.odometry.interface import Estimator
     from bentwing.recording.preprocess import RecordingPart
     from bentwing.run.folder import RunFolder
+    from bentwing.run.found import Found
     from bentwing.run.settings import RunSettings
 
 
@@ -55,30 +55,14 @@ class Job:
         return self.part.recording.clock.start_ns
 
 
-def estimate(job: Job, found: Found, engine: Estimator) -> Found:
-    """Find the open-loop trajectory and the calibration; with a failure, as far as they go."""
-    part, counts, spin = job.part, Counter[str](), Spin()
-    carrier = CarrierWatch(part.payload)
-    failure: BaseException | None = None
-    open_loop: Estimate | None = None
-    try:
-        with job.folder.stage("estimate"), job.progress.stage("estimate", part.length) as shown:
-            for batch in part.batches(shown, counts):
-                engine.feed(batch)
-                spin.watch(batch)
-                if not part.payload.self_hits:
-                    carrier.add(batch)
-            open_loop = engine.result()
-    except BaseException as error:
-        failure = error
-        # There may be nothing yet, and an interrupt may find a step half done.
-        lacking = Exception if isinstance(error, KeyboardInterrupt) else EstimationError
-        if isinstance(error, (EstimationError, KeyboardInterrupt)):
-            with suppress(lacking):
-                open_loop = engine.so_far()
-    warnings = [*part.recording.warnings, *carrier_warnings(part.payload, carrier.boxes())]
-    reading = Reading(dict(part.recording.counts + counts), warnings)
-    return replace(found, estimate=open_loop, reading=reading, spin=spin, failure=failure)
+def estimate(job: Job, found: Found, engine: Estimator, *, may_stop: bool = False) -> Found:
+    """Find the open-loop trajectory and the calibration; with a failure, as far as they go.
+
+    Parameters
+    ----------
+    may_stop : whether to stop with a doubt as soon as the estimate is certainly wrong
+    """
+    return FirstPass(job, engine, may_stop=may_stop).run(found)
 
 
 def close(job: Job, found: Found) -> Found:
@@ -120,6 +104,7 @@ def close(job: Job, found: Found) -> Found:
         estimate=closed.estimate,
         loop_closure=closed.record,
         stage_warnings=(*found.stage_warnings, *closed.warnings),
+        evidence=(*found.evidence, *judge_closing(closed.record, [open_loop])),
     )
 
 
@@ -181,7 +166,8 @@ def make_map(job: Job, found: Found) -> Found:
             placed=found.placed,
             difference=difference,
         )
-    return replace(found, map=written)
+    evidence = judge_revisits(written.revisits, part.payload.lidar.range_sigma)
+    return replace(found, map=written, evidence=(*found.evidence, *evidence))
 
 
 def _known(found: Found) -> Estimate:

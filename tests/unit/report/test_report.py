@@ -9,6 +9,7 @@ import pytest
 
 from bentwing.base import geometry
 from bentwing.base.trajectory import Trajectory
+from bentwing.evaluate.verdict import Evidence, verdict_of
 from bentwing.report import write_report
 from bentwing.report.calibration import calibration_table
 
@@ -152,9 +153,11 @@ def test_the_page_is_the_same_without_a_drawing_library(tmp_path, whole_page, mo
 @pytest.mark.parametrize(
     ("changes", "headline", "level"),
     [
-        ({}, "Map finished, no warnings", "good"),
-        ({"warnings": ["Head stalled."]}, "with 1 warning<", "warn"),
-        ({"warnings": ["a", "b"]}, "with 2 warnings", "warn"),
+        ({}, "Map finished<", "good"),
+        ({"warnings": ["Head stalled."]}, "Map finished<", "good"),
+        ({"verdict": verdict_of([]).to_json()}, "Good: ", "good"),
+        ({"verdict": verdict_of([Evidence("gravity", 0.9)]).to_json()}, "Doubtful: ", "warn"),
+        ({"verdict": verdict_of([Evidence("gravity", 9.0)]).to_json()}, "Failed: ", "bad"),
         ({"complete": False, "stage": "map", "reason": "interrupted"}, "Incomplete", "bad"),
     ],
 )

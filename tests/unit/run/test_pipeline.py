@@ -125,7 +125,12 @@ def test_a_run_leaves_all_files_of_the_contract(tmp_path, recording):
     assert record["counts"]["map.points"] == record["counts"]["lidar.points"] == 10_000
     assert record["warnings"] == ["/imu: a gap of 0.2 s", "one plane only at 3 s"]
     assert set(record["timings"]) == {"inputs", "estimate", "loops", "map", "report", "total"}
-    assert "Map finished, with 2 warnings" in run.report_path.read_text()
+    assert run.verdict.state == record["verdict"]["state"] == "failed"
+    reasons = [reason["sentence"] for reason in record["verdict"]["reasons"]]
+    assert any("the accelerations are all zero" in reason for reason in reasons)
+    page = run.report_path.read_text()
+    assert "Failed: this map is wrong, do not use it" in page
+    assert all(warning in page for warning in run.warnings)
     assert run.warnings == ("/imu: a gap of 0.2 s", "one plane only at 3 s")
 
 

@@ -21,6 +21,7 @@ from bentwing.flight.live.live_map import LiveMap, MapUpdate
 from bentwing.flight.live.prediction import StampedPose, past_pose
 from bentwing.flight.live.state import LiveState, Published
 from bentwing.flight.live.status import Status, status_of
+from bentwing.flight.live.watchdog import Watchdog
 from bentwing.flight.live.worker import Worker
 from bentwing.odometry import create
 from bentwing.recording.batches import EncoderBatch, ImuBatch, LidarBatch
@@ -100,6 +101,7 @@ class Odometry:
             self._engine,
             Preprocessing(head, self._filtered),
             self._state,
+            Watchdog(head),
             partial(LiveMap, map_spacing, max_map_points, n_threads),
         )
         # Not a method of this object, which could then never be collected.
@@ -250,7 +252,8 @@ class Odometry:
         yet. `initializing`: poses, but latency, mount and biases are still being learned.
         `tracking`. `degenerate`: the surfaces of the last window leave a direction unseen, the IMU
         carries it. `coasting`: there was no window for longer than two shifts, the lidar is silent or
-        registration too slow; the IMU alone carries the pose. `failed`: feeding and reading raise why.
+        registration too slow; the IMU alone carries the pose. `failed`: feeding and reading raise why,
+        within ten seconds of motion where units, axes, mount or clocks are wrong.
         """
         if self._worker.error is not None:
             return "failed"

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from bentwing.flight.live.live_map import LiveMap
     from bentwing.flight.live.state import LiveState
+    from bentwing.flight.live.watchdog import Watchdog
     from bentwing.odometry.interface import Estimator
     from bentwing.recording.batches import Batch
     from bentwing.recording.preprocess import Preprocessing
@@ -33,6 +34,7 @@ class Worker:
     ----------
     engine, preprocessing : owned by the thread from now on
     state : where windows are published
+    watchdog : ends the estimate if it is certainly wrong
     new_map : makes the map of a pass
     """
 
@@ -41,11 +43,13 @@ class Worker:
         engine: Estimator,
         preprocessing: Preprocessing,
         state: LiveState,
+        watchdog: Watchdog,
         new_map: Callable[[], LiveMap],
     ) -> None:
         self._engine = engine
         self._preprocessing = preprocessing
         self._state = state
+        self._watchdog = watchdog
         self._new_map = new_map
         # The pass that is mapped, by its number; of none there is nothing to publish yet.
         self._mapped = 0
@@ -137,9 +141,11 @@ class Worker:
     def _take(self, batches: deque[Batch]) -> None:
         for batch in batches:
             for usable in self._preprocessing.add(batch):
+                self._watchdog.add(usable)
                 self._engine.take(usable)
 
     def _register(self, *, finishing: bool = False) -> None:
+        self._watchdog.require_health(self._engine.current)
         if not finishing and self._is_waiting and not self._search():
             return
         while not self._stopping and self._engine.advance(finishing=finishing):

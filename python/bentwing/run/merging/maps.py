@@ -15,6 +15,7 @@ from bentwing.base.trajectory import DT
 from bentwing.closing.global_registration import Recorded, register_jointly
 from bentwing.closing.global_registration.stretches import Stretches
 from bentwing.closing.joining.matches import Match, Part
+from bentwing.evaluate.verdict import judge_closing, judge_revisits
 from bentwing.map.project import project
 from bentwing.odometry.segments import joined
 from bentwing.run.folder import RunFolder
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from bentwing.base.progress import Progress
     from bentwing.closing.joining.placing import Placed
     from bentwing.closing.joining.survey import Survey
+    from bentwing.evaluate.verdict import Verdict
     from bentwing.map.chunk import MapChunk
     from bentwing.run.merging.source import Source
     from bentwing.run.settings import MergeSettings
@@ -44,11 +46,13 @@ class MergedMap:
     out : its folder
     names : of the runs in it
     estimates : of the runs, in the frame of the map
+    verdict : whether it can be used, and why not
     """
 
     out: Path
     names: list[str]
     estimates: list[Estimate]
+    verdict: Verdict
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,7 +137,11 @@ def _separate_maps(
         "bentwing did not recognize common places of all runs: they are "
         f"{len(groups)} separate maps, {told}, and their relative poses are unknown"
     )
-    folder.record.found = Found(merging={**found.record, "maps": described}, stage_warnings=(note,))
+    folder.record.found = Found(
+        merging={**found.record, "maps": described},
+        stage_warnings=(note,),
+        judged=tuple(reason for one in maps for reason in one.verdict.reasons),
+    )
     say_warnings(found.progress, [note])
     report_run(folder, folder.record.found)
     return maps
@@ -175,6 +183,7 @@ def _one_map(
                 f"other: {result.failure}"
             )
     trajectory = joined_trajectory(estimates)
+    sigma = max(source.payload.lidar.range_sigma for source in sources)
     with folder.stage("map"):
         runs = write_trajectories(folder, sources, placed, estimates)
         written = write_map(
@@ -189,10 +198,13 @@ def _one_map(
         map=written,
         runs=runs,
         stage_warnings=tuple(notes),
+        evidence=(*judge_closing(closing, placed), *judge_revisits(written.revisits, sigma)),
+        judged=tuple(reason for source in sources for reason in source.reasons),
     )
     say_warnings(found.progress, [note for note in notes if note not in found.said])
     report_run(folder, folder.record.found, trajectory)
-    return MergedMap(folder.path, [source.name for source in sources], estimates)
+    names = [source.name for source in sources]
+    return MergedMap(folder.path, names, estimates, folder.record.found.verdict)
 
 
 def _map_source(source: Source, estimate: Estimate, found: Ingredients) -> MapSource:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,12 +15,13 @@ from bentwing.base.provenance import describe_input
 from bentwing.base.run_record import read_record
 from bentwing.recording import Payload, Recording
 from bentwing.recording.preprocess import RecordingPart
-from bentwing.run.run import estimate_of, require_single
+from bentwing.run.run import estimate_of, require_single, verdict_in
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from bentwing.base.estimate import Estimate
+    from bentwing.evaluate.verdict import Reason, Verdict
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +37,7 @@ class Source:
     force : whether the run mapped the recording although it is unfit
     start_ns : time zero of the recording, ns UTC
     inputs : what run.json says about the files
-    warnings : of the run
+    warnings, verdict : of the run
     """
 
     name: str
@@ -50,6 +51,12 @@ class Source:
     estimate: Estimate
     inputs: list[dict[str, Any]]
     warnings: list[str]
+    verdict: Verdict
+
+    @property
+    def reasons(self) -> list[Reason]:
+        """What speaks against the run, as a merged map repeats it."""
+        return [replace(r, sentence=f"{self.name}: {r.sentence}") for r in self.verdict.reasons]
 
     @property
     def told(self) -> list[str]:
@@ -126,6 +133,7 @@ def open_source(folder: Path, name: str) -> Source:
         estimate_of(folder, record),
         record["inputs"],
         list(record.get("warnings") or []),
+        verdict_in(record),
     )
 
 

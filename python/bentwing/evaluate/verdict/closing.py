@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""Whether the whole recording agrees with itself: loops, and surfaces seen in two visits."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bentwing.evaluate.verdict.evidence import Evidence
+from bentwing.evaluate.verdict.usual import usual_of
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from bentwing.base.estimate import Estimate
+    from bentwing.evaluate.revisits import Revisits
+
+# What closing moves is compared with no shorter path, m.
+_SHORTEST = 15.0
+# A pair of visits as far apart as this, m, is no surprise whatever the sensor.
+_OFFSET = 0.01
+_FEWEST = 50  # patches that were visited twice
+
+
+def judge_closing(
+    record: Mapping[str, Any] | None, estimates: Sequence[Estimate]
+) -> list[Evidence]:
+    """Judge by how much of what was seen again agrees, and by how far it moved the trajectory.
+
+    Parameters
+    ----------
+    record : of the closing, as run.json has it; None if it was not asked for
+    estimates : before it
+    """
+    if not record or not record.get("n_revisits", record.get("n_stretch_pairs")):
+        return []
+    found = [Evidence("loop", 1.0 - float(record["inlier_share"]))]
+    if record.get("applied"):
+        moved = float(record["largest_translation"])
+        usual = max(_usual_drift(estimate) for estimate in estimates)
+        found.append(Evidence("correction", moved / usual, (), {"moved": moved}))
+    return found
+
+
+def judge_revisits(found: Revisits | None, sigma: float) -> list[Evidence]:
+    """Judge by how far apart two visits have measured the same flat surfaces.
+
+    Parameters
+    ----------
+    found : on the map; None if nothing was seen twice
+    sigma : m, of a range
+    """
+    if found is None or found.n_patches < _FEWEST:
+        return []
+    expected = float(np.hypot(sigma, _OFFSET))
+    return [Evidence("revisits", found.std / expected, (), {"millimetres": 1e3 * found.median})]
+
+
+def _usual_drift(estimate: Estimate) -> float:
+    """How far an open-loop trajectory usually drifts, m."""
+    # Half a second apart, so that vibration does not count.
+    steps = np.diff(estimate.trajectory.positions[::50], axis=0)
+    length = float(np.linalg.norm(steps, axis=1).sum())
+    return usual_of(estimate.windows).drift * max(length, _SHORTEST)

@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""The kinds of evidence: what is doubtful and what has failed, in words a surveyor knows.
+
+The bounds come from the distributions over simulated good and faulted recordings that docs/verdict.md
+shows.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from bentwing.base.spans import name_spans
+
+if TYPE_CHECKING:
+    from bentwing.evaluate.verdict.evidence import Evidence
+
+_NEVER = math.inf
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """A kind of evidence.
+
+    Attributes
+    ----------
+    rank : of several reasons the one with the lowest is said first: it is nearest to the cause
+    doubtful, failed : values above make a result so
+    finding : says what was found, with `value`, `percent` (a hundred values), `when` and the facts
+    advice : says what to do
+    """
+
+    rank: int
+    doubtful: float
+    failed: float
+    finding: str
+    advice: str
+
+    def sentence(self, evidence: Evidence) -> str:
+        """Say what was found."""
+        when = f" {name_spans(evidence.spans)}" if evidence.spans else ""
+        value = evidence.value
+        return self.finding.format(value=value, percent=100 * value, when=when, **evidence.facts)
+
+
+_HEAD = "check T_imu_lidar, the axes and the units of the IMU, and the clocks with `bentwing info`"
+
+KINDS: dict[str, Kind] = {
+    "units": Kind(
+        0, 0.5, 0.5,
+        "{problem}",
+        "then map again",
+    ),
+    "constant": Kind(
+        0, 0.5, 0.5,
+        "the {instrument} gives the same value all the time",
+        "switch it on in the driver, and record again",
+    ),
+    "repeated": Kind(
+        0, 0.05, 0.2,
+        "{percent:.0f} % of the IMU's samples only repeat the one before",
+        "the IMU or its driver had stopped; record again",
+    ),
+    "gyro_limit": Kind(
+        1, 0.005, 0.05,
+        "{percent:.1f} % of the gyro's samples stay at the end of its range",
+        "set a larger range in the IMU, or turn more slowly",
+    ),
+    "accelerometer_limit": Kind(
+        1, 0.005, 0.05,
+        "{percent:.1f} % of the accelerometer's samples stay at the end of its range",
+        "set a larger range in the IMU, or damp the head",
+    ),
+    "imu_period": Kind(
+        2, 0.03, _NEVER,
+        "the IMU gives {rate:.0f} samples a second, too few for a lidar that moves",
+        "set the IMU to 100 Hz or more",
+    ),
+    "even_ranges": Kind(
+        3, 20.0, 40.0,
+        "all returns of the lidar have nearly the same range: it saw no surroundings",
+        "check the lidar and its driver",
+    ),
+    "slice": Kind(
+        3, 0.9, 0.98,
+        "the plane of the 2D lidar stays the same: the map is one slice of the surroundings",
+        "spin or nod the lidar, or use a 2D SLAM program",
+    ),
+    "gravity": Kind(
+        4, 0.4, 3.0,
+        "the mean force of the accelerometer differs from gravity by {value:.2f} m/s²",
+        "check its unit, its scale and whether the driver removes gravity",
+    ),
+    "matches": Kind(
+        5, 3.0, 20.0,
+        "{share:.0f} % of the surfaces seen again do not fit the trajectory{when}",
+        _HEAD,
+    ),
+    "lost": Kind(
+        6, 0.1, 0.25,
+        "for {seconds:.0f} s{when} the lidar sees nothing that fits what it saw before",
+        _HEAD,
+    ),
+    "unseen": Kind(
+        11, 4.0, _NEVER,
+        "for {value:.0f} s the surroundings show too little structure to tell where the lidar is",
+        "compare the map before and after, and fly there with more structure in view",
+    ),
+    "loop": Kind(
+        6, 0.03, 0.15,
+        "{percent:.0f} % of the surfaces that were seen more than once in the whole recording do not "
+        "fit together",
+        _HEAD,
+    ),
+    "gyro": Kind(
+        7, 2.0, 6.0,
+        "the trajectory turns otherwise than the gyro says, by {degrees:.2f} °/s{when}",
+        "check T_imu_lidar, the gyro's axes and scale, and the clocks",
+    ),
+    "accelerometer": Kind(
+        8, 0.5, 3.0,
+        "the trajectory moves otherwise than the accelerometer says, by {force:.2f} m/s²{when}",
+        "check the accelerometer's axes and scale, and the unit of the ranges",
+    ),
+    "clocks": Kind(
+        9, 3e-4, _NEVER,
+        "the clocks of lidar and IMU run apart by {milliseconds:.2f} ms a second",
+        "synchronise them, or take the stamps of one computer",
+    ),
+    "calibration": Kind(
+        10, 8.0, _NEVER,
+        "{name} is {value:.0f} standard deviations off what payload.yaml says",
+        "compare the calibration in the report with the drawing of the head, and correct payload.yaml",
+    ),
+    "correction": Kind(
+        11, 2.0, 20.0,
+        "closing the loops moved the trajectory by {moved:.2f} m, more than it usually drifts",
+        "look for doubled walls in the report",
+    ),
+    "revisits": Kind(
+        11, 2.0, 6.0,
+        "surfaces seen again lie {millimetres:.0f} mm apart",
+        "look for doubled walls in the report",
+    ),
+    "speed": Kind(
+        12, 40.0, 80.0,
+        "the trajectory reaches {value:.0f} m/s at {at:.1f} s",
+        _HEAD,
+    ),
+    "breaks": Kind(
+        13, 0.5, _NEVER,
+        "the recording is interrupted{when}, and where the map goes on is a guess",
+        "fly over what was seen before once more, or map the parts one by one",
+    ),
+}  # fmt: skip
+"""By their names."""

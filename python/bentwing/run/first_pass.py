@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""The first pass over a recording: the estimate, and all that is learned while its samples go by."""
+
+from __future__ import annotations
+
+from collections import Counter
+from contextlib import suppress
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from bentwing.base.errors import EstimationError
+from bentwing.calibrate.carrier import CarrierWatch, carrier_warnings
+from bentwing.evaluate.verdict import Watch, judge_estimate, judge_so_far
+from bentwing.run.found import Reading, Spin
+
+if TYPE_CHECKING:
+    from bentwing.base.estimate import Estimate
+    from bentwing.evaluate.verdict import Verdict
+    from bentwing.odometry.interface import Estimator
+    from bentwing.recording import Batch
+    from bentwing.run.found import Found
+    from bentwing.run.stages import Job
+
+# How often the beginning of an estimate is judged, s, and until when: later its set-up is known to be
+# right.
+_INTERVAL, _UNTIL = 2.0, 60.0
+
+
+class FirstPass:
+    """Feeds an estimator, and watches what it is fed.
+
+    Parameters
+    ----------
+    engine : that estimates
+    may_stop : whether to stop as soon as the estimate is certainly wrong
+    """
+
+    def __init__(self, job: Job, engine: Estimator, *, may_stop: bool) -> None:
+        self._job, self._engine, self._may_stop = job, engine, may_stop
+        self._spin, self._watch = Spin(), Watch()
+        self._carrier = CarrierWatch(job.part.payload)
+        self._counts = Counter[str]()
+        self._judged: float | None = None
+        self._until = 0.0
+
+    def run(self, found: Found) -> Found:
+        """Return what is known with the estimate; with a failure, as far as it goes."""
+        failure: BaseException | None = None
+        open_loop: Estimate | None = None
+        doubt: Verdict | None = None
+        job = self._job
+        try:
+            with (
+                job.folder.stage("estimate"),
+                job.progress.stage("estimate", job.part.length) as shown,
+            ):
+                for batch in job.part.batches(shown, self._counts):
+                    self._take(batch)
+                    if (doubt := self._doubt(batch)) is not None:
+                        break
+                open_loop = self._engine.result() if doubt is None else self._so_far()
+        except BaseException as error:
+            failure = error
+            if isinstance(error, (EstimationError, KeyboardInterrupt)):
+                open_loop = self._so_far(error)
+        return self._with(replace(found, estimate=open_loop, doubt=doubt, failure=failure))
+
+    def _take(self, batch: Batch) -> None:
+        self._engine.feed(batch)
+        self._spin.watch(batch)
+        self._watch.add(batch)
+        if not self._job.part.payload.self_hits:
+            self._carrier.add(batch)
+
+    def _doubt(self, batch: Batch) -> Verdict | None:
+        """Judge the estimate so far, now and then; returns the verdict if it is wrong."""
+        if not self._may_stop or not len(batch.times):
+            return None
+        now = float(batch.times[-1])
+        if self._judged is None:
+            self._judged, self._until = now, now + _UNTIL
+        if now < self._judged + _INTERVAL or now > self._until:
+            return None
+        self._judged = now
+        known = self._engine.current
+        estimate = None if known is None else known.estimate()
+        verdict = judge_so_far(estimate, self._job.part.payload, self._watch)
+        return verdict if verdict.state == "failed" else None
+
+    def _so_far(self, error: BaseException | None = None) -> Estimate | None:
+        # There may be nothing yet, and an interrupt may find a step half done.
+        lacking = Exception if isinstance(error, KeyboardInterrupt) else EstimationError
+        with suppress(lacking):
+            return self._engine.so_far()
+        return None
+
+    def _with(self, found: Found) -> Found:
+        part = self._job.part
+        warnings = [
+            *part.recording.warnings,
+            *carrier_warnings(part.payload, self._carrier.boxes()),
+        ]
+        evidence = () if found.estimate is None else judge_estimate(found.estimate, part.payload, self._watch)
+        return replace(
+            found,
+            reading=Reading(dict(part.recording.counts + self._counts), warnings),
+            spin=self._spin,
+            evidence=tuple(evidence),
+        )

@@ -37,6 +37,7 @@ def command(
     threads: options.Threads = None,
     start: options.Start = None,
     duration: options.Duration = None,
+    trust_payload: options.TrustPayload = False,
     force: options.Force = False,
     resume: options.Resume = False,
     quiet: options.Quiet = False,
@@ -61,6 +62,7 @@ def command(
         threads=threads,
         start=start,
         duration=duration,
+        trust_payload=True if trust_payload else None,
         force=True if force else None,
     )
     chosen = choose(settings, set_, payload, options_given)

@@ -174,6 +174,14 @@ WritePayload = Annotated[
         help="Write the sensor head as it was found, as payload.yaml; the file must not exist.",
     ),
 ]
+TrustPayload = Annotated[
+    bool,
+    option(
+        INPUT,
+        "--trust-payload",
+        help="Take the head as payload.yaml says, even where the recording shows another set-up.",
+    ),
+]
 Force = Annotated[
     bool,
     option(INPUT, "--force", help="Map a recording that `bentwing info` calls unfit."),

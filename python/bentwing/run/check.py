@@ -6,21 +6,24 @@ from __future__ import annotations
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from bentwing.base.errors import RecordingError, UsageError
+from bentwing.base.errors import UsageError
 from bentwing.base.geodesy import ProjectedSystem
-from bentwing.calibrate.inspection import judge
 from bentwing.closing.georeference.control_points import read_control_points
-from bentwing.recording import Recording
+from bentwing.run.head import Head
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from pathlib import Path
 
+    from bentwing.base.progress import Progress
+    from bentwing.recording import Recording
     from bentwing.run.settings import RunSettings
 
 
 @contextmanager
-def opened(paths: Path | str | Sequence[Path | str], settings: RunSettings) -> Iterator[Recording]:
+def opened(
+    paths: Path | str | Sequence[Path | str], settings: RunSettings, progress: Progress
+) -> Iterator[Head]:
     """Open a recording that can be mapped as the settings say.
 
     Raises
@@ -31,12 +34,11 @@ def opened(paths: Path | str | Sequence[Path | str], settings: RunSettings) -> I
         A setting or a file that it names cannot be used, or has no effect on this recording.
     """
     _require_coordinates(settings)
-    with Recording(paths, settings.payload, strict=False) as recording:
-        _require_effect(recording, settings)
-        _require_part(recording, settings.start)
-        if not settings.force:
-            _require_fit(recording)
-        yield recording
+    with Head(paths, settings, progress) as head:
+        _require_effect(head.recording, settings)
+        _require_part(head.recording, settings.start)
+        head.require_fit()
+        yield head
 
 
 def _require_coordinates(settings: RunSettings) -> None:
@@ -70,12 +72,3 @@ def _require_part(recording: Recording, start: float | None) -> None:
             f"{recording.duration:.1f} s"
         )
         raise UsageError(msg)
-
-
-def _require_fit(recording: Recording) -> None:
-    """Refuse what `bentwing info` calls unfit."""
-    if defects := judge(recording, has_payload=True).defects:
-        more = f" (`bentwing info` lists {len(defects) - 1} more)" if len(defects) > 1 else ""
-        msg = f"{defects[0]}{more}; to map it all the same, give --force"
-        raise RecordingError(msg)
-    recording.check()

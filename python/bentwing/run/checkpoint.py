@@ -22,11 +22,13 @@ from bentwing.base.estimate import Estimate
 from bentwing.base.plain import plain
 from bentwing.base.trajectory import Trajectory
 from bentwing.base.window_record import WindowRecord
+from bentwing.calibrate.set_up import SetUp
 from bentwing.evaluate.verdict import Evidence
 from bentwing.run.found import Found, Reading, Spin
 
 if TYPE_CHECKING:
     from bentwing.run.folder import RunFolder
+    from bentwing.run.settings import RunSettings
 
 NAME = "checkpoint.npz"
 _TRAJECTORY = ("times", "positions", "quats_xyzw")
@@ -41,11 +43,13 @@ class Checkpoint:
 
     Parameters
     ----------
-    folder : of the run, with its inputs and settings recorded
+    folder : of the run, with its inputs recorded
+    asked : settings as they were given; the head that was found may have changed those of the folder
     """
 
-    def __init__(self, folder: RunFolder) -> None:
+    def __init__(self, folder: RunFolder, asked: RunSettings) -> None:
         self._folder = folder
+        self._settings = asked
         self._path = folder.path / NAME
 
     def save(self, stage: str, found: Found) -> None:
@@ -63,6 +67,7 @@ class Checkpoint:
             "corrections": {name: getattr(found, name) for name in _CORRECTIONS},
             "stage_warnings": found.stage_warnings,
             "evidence": found.evidence,
+            "set_up": None if found.set_up is None else found.set_up.to_json(),
             "timings": record.timings,
             "files": [name for name in record.files if name != NAME],
         }
@@ -121,9 +126,8 @@ class Checkpoint:
             files.remove(NAME)
 
     def _asked(self) -> dict[str, Any]:
-        record = self._folder.record
-        settings = {k: v for k, v in record.settings.items() if k not in _FREE}
-        asked: dict[str, Any] = plain({**settings, "inputs": record.inputs})
+        settings = {k: v for k, v in self._settings.to_json().items() if k not in _FREE}
+        asked: dict[str, Any] = plain({**settings, "inputs": self._folder.record.inputs})
         return asked
 
     def _require_same(self, earlier: dict[str, Any]) -> None:
@@ -150,4 +154,5 @@ def _found(arrays: dict[str, Any], described: dict[str, Any]) -> Found:
         **described["corrections"],
         stage_warnings=tuple(described["stage_warnings"]),
         evidence=tuple(Evidence.from_json(one) for one in described.get("evidence") or []),
+        set_up=SetUp.from_json(described["set_up"]) if described.get("set_up") else None,
     )

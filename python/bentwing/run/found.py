@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bentwing.base.estimate import Estimate
+    from bentwing.calibrate.set_up import SetUp
     from bentwing.closing.georeference.georeference import Georeferenced
     from bentwing.closing.localize import GivenCoordinates
     from bentwing.evaluate.revisits import Revisits

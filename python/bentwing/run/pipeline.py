@@ -8,14 +8,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bentwing import odometry
 from bentwing.base.progress import as_progress
 from bentwing.closing.localize import read_prior_map
-from bentwing.recording.preprocess import RecordingPart
 from bentwing.run import stages
 from bentwing.run.check import opened
 from bentwing.run.checkpoint import Checkpoint
 from bentwing.run.choose import as_run_settings
+from bentwing.run.estimate import estimate
 from bentwing.run.folder import RunFolder
 from bentwing.run.report import report_failure, report_run, say_warnings
 from bentwing.run.run import Run
@@ -50,6 +49,7 @@ def map_recording(
     threads: int | None = None,
     start: float | None = None,
     duration: float | None = None,
+    trust_payload: bool = False,
     force: bool = False,
     resume: bool = False,
     progress: Progress | None = None,
@@ -74,6 +74,7 @@ def map_recording(
         some of it, over which the other arguments stand; default: the defaults
     threads : of the estimator; default: all cores
     start, duration : s, the part of the recording to use; default: all of it
+    trust_payload : take the head as the payload says, even where the recording shows another set-up
     force : map a recording that `bentwing info` calls unfit all the same
     resume : go on behind the last stage that an earlier run in `out` has finished, if there is one
     progress : what to tell the user meanwhile; default: nothing
@@ -96,6 +97,7 @@ def map_recording(
         threads=threads,
         start=start,
         duration=duration,
+        trust_payload=True if trust_payload else None,
         force=True if force else None,
     )
     described = payload if isinstance(payload, (str, Path)) else None
@@ -122,22 +124,23 @@ def run_recording(
     -------
     What the stages have found; `Run.of` makes a run of it.
     """
-    engine = odometry.create(
-        settings.estimator, settings.payload, settings.of_estimator, settings.threads
-    )
     watch = as_progress(progress)
     with (
-        opened(paths, settings) as recording,
+        opened(paths, settings, watch) as head,
         RunFolder(Path(out), settings.to_json()) as folder,
     ):
-        part = RecordingPart(recording, settings.payload, settings.start, settings.duration)
-        job = stages.Job(part, folder, settings, watch)
+        folder.record.settings = head.settings.to_json()
+        job = stages.Job(head.part, folder, head.settings, watch)
         with _reported(folder, watch):
             job = replace(job, prior=_open_inputs(job, payload_file))
-            checkpoint = Checkpoint(folder)
+            checkpoint = Checkpoint(folder, settings)
             done, found = checkpoint.restore(resume=resume)
+            if found.set_up is not None and found.set_up != head.set_up:
+                head.use(found.set_up)
+                job = replace(job, part=head.part, settings=head.settings)
             if done is None:
-                found = _keep(job, stages.estimate(job, found, engine), open_loop=True)
+                job, found = estimate(job, found, head)
+                found = _keep(job, found, open_loop=True)
                 checkpoint.save("estimate", found)
             if settings.closes_loops and done != "loops":
                 found = _keep(job, stages.close(job, found))

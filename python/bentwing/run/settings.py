@@ -97,6 +97,10 @@ class RunSettings(MapSettings):
         default=False,
         description="whether a recording that `bentwing info` calls unfit is mapped all the same",
     )
+    trust_payload: bool = Field(
+        default=False,
+        description="whether the payload holds even where the recording shows another set-up",
+    )
     continuous: ContinuousSettings = Field(
         default=ContinuousSettings(), description="settings of the continuous estimator"
     )

@@ -15,7 +15,6 @@ from bentwing.closing.joining.segments import close_segments
 from bentwing.closing.localize import Difference, NotInMapError, find_in_map
 from bentwing.evaluate.verdict import judge_closing, judge_revisits
 from bentwing.map.project import project
-from bentwing.run.first_pass import FirstPass
 from bentwing.run.mapping import MapSource, write_map
 
 if TYPE_CHECKING:
@@ -25,7 +24,6 @@ if TYPE_CHECKING:
     from bentwing.base.progress import Stage
     from bentwing.closing.localize import PriorMap
     from bentwing.map.chunk import MapChunk
-    from bentwing.odometry.interface import Estimator
     from bentwing.recording.preprocess import RecordingPart
     from bentwing.run.folder import RunFolder
     from bentwing.run.found import Found
@@ -53,16 +51,6 @@ class Job:
     def origin_ns(self) -> int:
         """Absolute time of the recording's start, ns UTC."""
         return self.part.recording.clock.start_ns
-
-
-def estimate(job: Job, found: Found, engine: Estimator, *, may_stop: bool = False) -> Found:
-    """Find the open-loop trajectory and the calibration; with a failure, as far as they go.
-
-    Parameters
-    ----------
-    may_stop : whether to stop with a doubt as soon as the estimate is certainly wrong
-    """
-    return FirstPass(job, engine, may_stop=may_stop).run(found)
 
 
 def close(job: Job, found: Found) -> Found:

@@ -6,8 +6,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
+from bentwing.base.plain import plain
+from bentwing.recording import Payload
+
 if TYPE_CHECKING:
-    from bentwing.recording import Payload
+    from collections.abc import Mapping
 
 Kind = Literal["mount", "axes", "units", "latency", "mirrored", "encoder", "ranges", "clock"]
 
@@ -47,7 +50,15 @@ class SetUp:
     findings: tuple[Finding, ...] = ()
     doubt: str | None = None
 
-    @property
-    def is_certain(self) -> bool:
-        """Whether what was found can be relied on."""
-        return self.doubt is None
+    def to_json(self) -> dict[str, Any]:
+        """Return the set-up in plain JSON types."""
+        return {
+            "payload": plain(self.payload.model_dump()),
+            "findings": [finding.to_json() for finding in self.findings],
+        }
+
+    @classmethod
+    def from_json(cls, described: Mapping[str, Any]) -> SetUp:
+        """Read what `to_json` wrote of a set-up that is certain."""
+        payload = Payload.model_validate(described["payload"])
+        return cls(payload, tuple(Finding(**finding) for finding in described["findings"]))

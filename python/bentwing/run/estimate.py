@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""The estimate of a run; where it contradicts the payload, the head is found and estimated anew."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from bentwing import odometry
+from bentwing.base.errors import RecordingError
+from bentwing.run.first_pass import FirstPass
+from bentwing.run.head import ALL_THE_SAME
+
+if TYPE_CHECKING:
+    from bentwing.calibrate.set_up import SetUp
+    from bentwing.evaluate.verdict import Verdict
+    from bentwing.run.found import Found
+    from bentwing.run.head import Head
+    from bentwing.run.stages import Job
+
+# Reasons that another set-up of the head may explain.
+_OF_HEAD = frozenset(
+    {
+        "matches",
+        "lost",
+        "loop",
+        "gravity",
+        "gyro",
+        "accelerometer",
+        "calibration",
+        "units",
+        "speed",
+        "slice",
+    }
+)
+_RANK = ("good", "doubtful", "failed")
+
+
+def estimate(job: Job, found: Found, head: Head) -> tuple[Job, Found]:
+    """Estimate with the payload, and if that is contradicted with the set-up that the recording shows.
+
+    Parameters
+    ----------
+    head : the recording, which may be read anew
+
+    Returns
+    -------
+    The job, with the part of the recording that was used, and what was found.
+
+    Raises
+    ------
+    RecordingError
+        The estimate is wrong from the start, and no other set-up is certain.
+    """
+    may_repair = head.set_up is None and not (job.settings.trust_payload or job.settings.force)
+    first = _first_pass(job, replace(found, set_up=head.set_up), may_stop=may_repair)
+    verdict = first.doubt or first.verdict
+    if not may_repair or first.failure is not None or not _blames_head(verdict):
+        return job, first
+    shown = head.found()
+    if shown.doubt is not None:
+        if first.doubt is not None:
+            raise RecordingError(_refusal(verdict, shown))
+        return job, first
+    if shown.findings:
+        head.use(shown)
+        job = replace(job, part=head.part, settings=head.settings)
+        job.folder.record.settings = head.settings.to_json()
+    elif first.doubt is None:
+        return job, first
+    return job, _first_pass(job, replace(found, set_up=head.set_up), may_stop=False)
+
+
+def _first_pass(job: Job, found: Found, *, may_stop: bool) -> Found:
+    settings = job.settings
+    engine = odometry.create(
+        settings.estimator, settings.payload, settings.of_estimator, settings.threads
+    )
+    return FirstPass(job, engine, may_stop=may_stop).run(found)
+
+
+def _blames_head(verdict: Verdict) -> bool:
+    return any(reason.kind in _OF_HEAD for reason in verdict.reasons)
+
+
+def _refusal(verdict: Verdict, shown: SetUp) -> str:
+    main = verdict.reasons[0]
+    return f"{shown.doubt} ({main.sentence}); {ALL_THE_SAME}"

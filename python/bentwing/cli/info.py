@@ -37,7 +37,9 @@ def command(
     options.require_new_file(write_payload)
     inspection = inspect(recording, payload)
     if write_payload is not None:
-        draft_payload(recording, payload, inspection.self_hits).save(write_payload)
+        shown = inspection.set_up
+        described = payload if shown is None or shown.doubt is not None else shown.payload
+        draft_payload(recording, described, inspection.self_hits).save(write_payload)
     if as_json:
         typer.echo(json.dumps({**plain(inspection), "is_fit": inspection.is_fit}))
     else:

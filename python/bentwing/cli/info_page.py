@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from rich.markup import escape
 from rich.table import Table
+from rich.text import Text
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from bentwing.calibrate.inspection import Inspection
     from bentwing.calibrate.inspection.inspect import TopicReport
     from bentwing.calibrate.inspection.spin import Spin
+    from bentwing.calibrate.set_up import SetUp
 
 BARS = "▁▂▃▄▅▆▇█"
 SPARKLINE_WIDTH = 60
@@ -58,7 +60,7 @@ def _gaps(gaps: list[tuple[float, float]]) -> str:
     return text + (f" and {len(gaps) - MAX_GAPS} more" if len(gaps) > MAX_GAPS else "")
 
 
-def _sensors(inspection: Inspection) -> Iterator[str]:
+def _sensors(inspection: Inspection) -> Iterator[RenderableType]:
     if inspection.point_times is not None:
         yield f"times      {escape(inspection.point_times)}"
     if inspection.spin is not None:
@@ -66,6 +68,7 @@ def _sensors(inspection: Inspection) -> Iterator[str]:
     if inspection.static_start is not None:
         start, end = inspection.static_start
         yield f"start      static from {start:.1f} to {end:.1f} s"
+    yield from _set_up(inspection.set_up)
     for one in inspection.self_hits:
         first, last = ([f"{c:.2f}" for c in corner] for corner in (one.box.min, one.box.max))
         yield f"carrier    seen from ({' '.join(first)}) to ({' '.join(last)}) m, lidar frame"
@@ -77,6 +80,19 @@ def _sensors(inspection: Inspection) -> Iterator[str]:
             f"ranges {low:.1f} to {high:.1f} m (5 to 95 %), median {middle:.1f} m; "
             f"{structure.far_share:.0%} beyond 20 m"
         )
+
+
+def _set_up(set_up: SetUp | None) -> Iterator[RenderableType]:
+    if set_up is None:
+        return
+    if set_up.doubt is not None:
+        yield f"set-up     [yellow]not found[/yellow]: {escape(set_up.doubt)}"
+    elif not set_up.findings:
+        yield "set-up     as the payload says"
+    for finding in set_up.findings:
+        yield f"set-up     [yellow]{escape(finding.sentence)}[/yellow]"
+        # not wrapped, so that it can be pasted
+        yield Text(f"           {finding.line}", style="bold", no_wrap=True, overflow="ignore")
 
 
 def _spin(spin: Spin) -> Iterator[str]:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,18 +12,22 @@ import numpy as np
 
 from bentwing.base.errors import RecordingError
 from bentwing.calibrate.carrier import CarrierWatch, carrier_warnings
+from bentwing.calibrate.draft import draft_payload
 from bentwing.calibrate.inspection import fitness
 from bentwing.calibrate.inspection.spin import Spin, spin_from_encoder, spin_from_gyro
 from bentwing.calibrate.inspection.structure import Structure, StructureMeter
+from bentwing.calibrate.set_up import find_set_up
 from bentwing.recording.batches import EncoderBatch, ImuBatch
 from bentwing.recording.containers.source import open_source
 from bentwing.recording.preprocess import Preprocessing
+from bentwing.recording.payload import as_payload
 from bentwing.recording.recording import Recording
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from bentwing.calibrate.inspection.fitness import Stretch
+    from bentwing.calibrate.set_up import SetUp
     from bentwing.recording.containers.scanned import TopicInfo
     from bentwing.recording.payload import PayloadLike
     from bentwing.recording.sections.self_hits import SelfHit
@@ -58,6 +62,7 @@ class Inspection:
     counts : everything read and dropped
     defects : what prevents mapping, each with how to repair it
     warnings : what may make the map worse
+    set_up : the sensor head as the motion shows it; None where there is no IMU and no encoder
     """
 
     paths: list[str]
@@ -72,6 +77,7 @@ class Inspection:
     counts: dict[str, int] = field(default_factory=dict)
     defects: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
+    set_up: SetUp | None = None
 
     @property
     def is_fit(self) -> bool:
@@ -80,7 +86,7 @@ class Inspection:
 
 
 def inspect(paths: Path | str | Sequence[Path | str], payload: PayloadLike = None) -> Inspection:
-    """Read a recording once and report on it.
+    """Read a recording, find how its head is set up, and report on both.
 
     Parameters
     ----------
@@ -94,10 +100,23 @@ def inspect(paths: Path | str | Sequence[Path | str], payload: PayloadLike = Non
     """
     listed = [Path(path) for path in ([paths] if isinstance(paths, (str, Path)) else paths)]
     try:
-        with Recording(listed, payload, strict=False) as recording:
-            return _inspect_recording(recording, has_payload=payload is not None)
+        set_up = _set_up(listed, payload)
+        is_known = set_up is not None and set_up.doubt is None
+        described = set_up.payload if set_up is not None and is_known else payload
+        with Recording(listed, described, strict=False) as recording:
+            found = _inspect_recording(recording, has_payload=described is not None)
     except RecordingError as error:
         return _topics_only(listed, str(error))
+    return replace(found, set_up=set_up)
+
+
+def _set_up(paths: list[Path], payload: PayloadLike) -> SetUp | None:
+    described = draft_payload(paths).payload if payload is None else as_payload(payload)
+    with Recording(paths, described, strict=False) as recording:
+        moves = recording.imu_topic is not None or recording.encoder_topic is not None
+        if not moves or recording.point_times is None:
+            return None
+    return find_set_up(paths, described)
 
 
 def _topics_only(paths: list[Path], defect: str) -> Inspection:

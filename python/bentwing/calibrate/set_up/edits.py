@@ -26,8 +26,10 @@ LARGEST_LATENCY = 1.5  # s that a payload can describe; more goes into the clock
 
 def as_given(payload: Payload) -> Payload:
     """Return the payload that reads the samples of lidar and IMU as drivers give them."""
-    imu = with_imu(payload, axes=AS_GIVEN, gyro_axes=None, units=ImuUnits()) if payload.imu else payload
-    return with_lidar(imu, latency=0.0, mirrored=False, range_scale=1.0)
+    imu = payload.imu
+    if imu is not None and (imu.axes, imu.gyro_axes, imu.units) != (AS_GIVEN, None, ImuUnits()):
+        payload = with_imu(payload, axes=AS_GIVEN, gyro_axes=None, units=ImuUnits())
+    return with_lidar(payload, latency=0.0, mirrored=False, range_scale=1.0)
 
 
 def with_lidar(payload: Payload, **changes: Any) -> Payload:  # noqa: ANN401 - any field
@@ -51,6 +53,9 @@ def with_axes(
 ) -> Payload:
     """Return the payload with axes (3, 3) of the IMU."""
     own = None if np.array_equal(gyro, accel) else axes.named(gyro)
+    imu = payload.imu or Imu()
+    if (imu.axes, imu.gyro_axes) == (axes.named(accel), own):
+        return payload
     return with_imu(payload, axes=axes.named(accel), gyro_axes=own)
 
 

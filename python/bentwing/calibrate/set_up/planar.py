@@ -14,7 +14,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from bentwing.calibrate.set_up import axes, edits
-from bentwing.calibrate.set_up.returns import delays_by_returns
+from bentwing.calibrate.set_up.returns import NEARBY, delays_by_returns
 from bentwing.calibrate.set_up.rotations import cover
 from bentwing.calibrate.set_up.spatial import NotFoundError
 from bentwing.calibrate.set_up.trial import try_payload
@@ -29,14 +29,14 @@ if TYPE_CHECKING:
     from bentwing.calibrate.set_up.trial import Trial
     from bentwing.recording import ImuBatch, Payload
 
-TRIED = 6.0  # s of the richest motion on which descriptions are tried
+TRIED, GLANCE = 6.0, 2.5  # s of the richest motion on which descriptions are tried, and first seen
 CLOSE = 0.2  # rad, std of a rotation that is described
 WIDE = 0.5  # rad, std of a rotation that is one of a cover
 UNKNOWN_LATENCY = 0.02  # s, std once it was found
 UNKNOWN_SHIFT = 0.1  # m, std where no mount is described
 # Axes that explain how gravity turns nearly as well as the best are possible.
 AS_GOOD = 1.3
-SECOND_ROUNDS = 3
+SECOND_GLANCES = 8
 
 
 def describe_by_trials(
@@ -55,7 +55,9 @@ def describe_by_trials(
         None of the descriptions does.
     """
     trials = _Trials(stretch, threads)
-    delays = [0.0, *delays_by_returns(stretch, stretch.read_as(payload).imu)]
+    seen = delays_by_returns(stretch, stretch.read_as(payload).imu)
+    # The clocks may well agree, whatever the returns seem to say.
+    delays = seen if any(abs(delay) < NEARBY for delay in seen) else [0.0, *seen]
     relative = list(_relative_axes(stretch.read_as(payload).imu))
     if has_mount:
         for delay, (gyro, accel) in itertools.product(delays, _own_axes(relative)):
@@ -79,34 +81,37 @@ class _Trials:
 
     def consistent(self, payload: Payload, *, rotation: float) -> Payload | None:
         """Return what a description has become if all fits together with it."""
-        trial = self._tried(payload, rotation)
+        trial = self._tried(payload, rotation, TRIED)
         return _learned(payload, trial) if trial.is_consistent else None
 
     def searched(self, payload: Payload, centre: NDArray[np.float64] | None) -> Payload | None:
         """Look for the rotation of the lidar anywhere, nearest to `centre` first."""
         middle = Rotation.identity() if centre is None else Rotation.from_matrix(centre)
-        trials = []
+        glances = []
         for rotation in cover(middle):
-            trial = self._tried(edits.with_rotation(payload, rotation.as_matrix()), WIDE)
-            if trial.is_consistent:
-                return _learned(payload, trial)
-            trials.append(trial)
-        trials.sort(key=lambda trial: -trial.score)
-        for trial in trials[:SECOND_ROUNDS]:
-            # From where it came to; what it saw first was blurred by where it came from.
-            if trial.calibration is None:
-                continue
-            again = self._tried(_learned(payload, trial), CLOSE)
-            if again.is_consistent:
-                return _learned(payload, again)
-        return None
+            turned = edits.with_rotation(payload, rotation.as_matrix())
+            glance = self._tried(turned, WIDE, GLANCE)
+            if glance.is_promising and (found := self._confirmed(payload, glance)) is not None:
+                return found
+            glances.append(glance)
+        glances = [glance for glance in glances if not glance.is_promising]
+        glances.sort(key=lambda glance: -glance.score)
+        confirmed = (self._confirmed(payload, glance) for glance in glances[:SECOND_GLANCES])
+        return next((found for found in confirmed if found is not None), None)
+
+    def _confirmed(self, payload: Payload, glance: Trial) -> Payload | None:
+        """Return what a glance has learned if all fits together with it."""
+        if glance.calibration is None:
+            return None
+        # What it saw first was blurred by where it came from.
+        return self.consistent(_learned(payload, glance), rotation=CLOSE)
 
     @property
     def failure(self) -> str:
         """Say how well the best description did."""
         return "nothing that can be seen" if self._best is None else self._best.sentence
 
-    def _tried(self, payload: Payload, rotation: float) -> Trial:
+    def _tried(self, payload: Payload, rotation: float, length: float) -> Trial:
         wide = edits.with_std(
             payload,
             extrinsic_rotation=rotation,
@@ -114,7 +119,8 @@ class _Trials:
             latency=UNKNOWN_LATENCY,
         )
         read = self._stretch.read_as(wide)
-        trial = try_payload(read.part(*richest(read.imu, TRIED)), wide, self._threads)
+        start, _ = richest(read.imu, TRIED)
+        trial = try_payload(read.part(start, start + length), wide, self._threads)
         if self._best is None or trial.score > self._best.score:
             self._best = trial
         return trial

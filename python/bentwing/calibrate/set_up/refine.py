@@ -13,6 +13,7 @@ from bentwing.calibrate.set_up.trial import try_payload
 from bentwing.recording.sections.section import Transform
 
 if TYPE_CHECKING:
+    from bentwing.base.calibration import Calibration
     from bentwing.base.mount import Pose
     from bentwing.calibrate.set_up.stretch import Stretch
     from bentwing.recording import Payload
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 # Standard deviations of what was found before: s, rad; and of a shift that nothing has told yet, m.
 FOUND_LATENCY, FOUND_ROTATION, UNKNOWN_SHIFT = 0.005, 0.03, 0.15
 REFINED = 12.0  # s
+CAUTION = 2.0  # what a short stretch says of a mount is less certain than it seems
 
 
 def refined(
@@ -41,11 +43,19 @@ def refined(
         raise NotFoundError(trial.sentence)
     mount = trial.calibration.mount
     found = edits.with_latency(payload, trial.calibration.source_latency)
+    if not has_mount:
+        # What little was seen leaves of it is still to be found.
+        found = edits.with_std(found, **_std(trial.calibration))
     if isinstance(mount, FixedMount):
         return found.model_copy(update={"T_imu_lidar": _transform(mount.T_imu_lidar)})
     return edits.with_encoder(
         found, T_imu_motor=_transform(mount.T_imu_motor), zero=mount.encoder_zero
     )
+
+
+def _std(found: Calibration) -> dict[str, float]:
+    names = ("extrinsic_rotation", "extrinsic_translation")
+    return {name: CAUTION * max(found.std[name]) for name in names}
 
 
 def _transform(pose: Pose) -> Transform:

@@ -128,6 +128,8 @@ def _scaled(payload: Payload, gyro: GyroFit, imu_topic: str) -> Payload:
             "correct its scale in the driver"
         )
         raise NotFoundError(msg)
+    if unit == imu.units.gyro:
+        return payload
     return edits.with_imu(payload, units=imu.units.model_copy(update={"gyro": unit}))
 
 

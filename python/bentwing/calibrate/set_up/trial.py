@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from bentwing.base.errors import BentwingError
 from bentwing.odometry.continuous.estimator import Continuous
+from bentwing.odometry.continuous.settings import ContinuousSettings, RegistrationSettings
 
 if TYPE_CHECKING:
     from bentwing.base.calibration import Calibration
@@ -17,6 +18,10 @@ if TYPE_CHECKING:
 
 # Of a right description 0.97 of the matches and more agree, with 0.2 to 0.45 of the expected noise;
 # of a wrong one at most 0.9, with 0.65 and more.
+# In a glance a right description is a little blurred by where it came from.
+PROMISING = 0.88
+# A wrong description never settles; a right one does soon.
+SETTINGS = ContinuousSettings(registration=RegistrationSettings(max_outer=8))
 LEAST_INLIERS, MOST_RESIDUAL, FEWEST_MATCHES = 0.95, 0.55, 150
 
 
@@ -41,6 +46,16 @@ class Trial:
         if self.last is None or self.last.inlier_share is None:
             return 0.0
         return self.last.n_matches * (2.0 * self.last.inlier_share - 1.0)
+
+    @property
+    def is_promising(self) -> bool:
+        """Whether most of what was seen fits together."""
+        last = self.last
+        return (
+            last is not None
+            and last.n_matches >= FEWEST_MATCHES
+            and (last.inlier_share or 0.0) >= PROMISING
+        )
 
     @property
     def is_consistent(self) -> bool:
@@ -69,7 +84,7 @@ class Trial:
 
 def try_payload(stretch: Stretch, payload: Payload, threads: int | None = None) -> Trial:
     """Estimate a stretch with a description of the head; the priors are as wide as it says."""
-    engine = Continuous(payload, threads=threads)
+    engine = Continuous(payload, SETTINGS, threads)
     try:
         for batch in stretch.preprocessed(payload):
             engine.feed(batch)

@@ -49,6 +49,5 @@ def with_imu_units(payload: Payload, imu: ImuBatch, topic: str) -> Payload:
         msg = f"{topic}: {'; '.join(imu_units.problems(imu.times, imu.gyro, imu.accel))}"
         raise NotFoundError(msg)
     is_degrees = imu_units.gyro_scale(imu.times, imu.gyro, imu.accel) != 1.0
-    return edits.with_imu(
-        payload, units=ImuUnits(accel=accel, gyro="deg/s" if is_degrees else "rad/s")
-    )
+    units = ImuUnits(accel=accel, gyro="deg/s" if is_degrees else "rad/s")
+    return payload if units == ImuUnits() else edits.with_imu(payload, units=units)

@@ -46,7 +46,8 @@ _AWAY = 0.1
 def judge_calibration(found: Calibration, payload: Payload) -> list[Evidence]:
     """Compare latency, mount and biases with what the payload says, in its standard deviations."""
     # Nothing is known of biases before: a rest tells more, but the payload says nothing of them.
-    usual = initial_std(moving=True)
+    stated = {} if payload.calibration is None else payload.calibration.std
+    usual = initial_std(moving=True, stated=stated)
     far = {
         name: np.abs(off) / usual[name]
         for name, off in _offsets(found, described_calibration(payload)).items()

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
     from bentwing.recording.sections.imu import Imu
 
+    Stated = Mapping[str, Sequence[float]]
+
 N_STATES = 20
 # Order of the core's `registration::index`.
 SLICES = {
@@ -66,9 +68,16 @@ MIN_REST_STD = 2e-3
 MATCH_INDEPENDENCE = 0.4
 
 
-def initial_std(*, moving: bool) -> dict[str, float]:
-    """Return the standard deviations before anything was measured, at rest or in motion."""
-    return INITIAL_STD | (MOVING_START_STD if moving else {})
+def initial_std(*, moving: bool, stated: Stated = MappingProxyType({})) -> dict[str, float]:
+    """Return the standard deviations before anything was measured, at rest or in motion.
+
+    Parameters
+    ----------
+    stated : of latency and mount in the payload; they count where they are larger than usual
+    """
+    largest = {name: max(stated[name]) for name in DESCRIBED if stated.get(name)}
+    wider = {name: std for name, std in largest.items() if std > INITIAL_STD[name]}
+    return INITIAL_STD | (MOVING_START_STD if moving else {}) | wider
 
 
 class SlowStatePrior:
@@ -86,10 +95,10 @@ class SlowStatePrior:
         has_motor: bool,
         moving: bool,
         frozen: Iterable[str],
-        stated: Mapping[str, Sequence[float]] = MappingProxyType({}),
+        stated: Stated = MappingProxyType({}),
     ) -> None:
         names = _frozen_names(frozen, has_imu=imu is not None, has_motor=has_motor)
-        std = initial_std(moving=moving) | _wider(stated)
+        std = initial_std(moving=moving, stated=stated)
         self.frozen = np.zeros(N_STATES, dtype=bool)
         self._information = np.zeros((N_STATES, N_STATES))
         self._offset = np.zeros(N_STATES)
@@ -190,12 +199,6 @@ class SlowStatePrior:
     ) -> NDArray[np.float64]:
         """Information of a window without that of its prior."""
         return _positive_part(np.linalg.inv(covariance[block]) - self._information[block])
-
-
-def _wider(stated: Mapping[str, Sequence[float]]) -> dict[str, float]:
-    """Return what is stated of latency and mount where that is less certain than usual."""
-    largest = {name: max(stated[name]) for name in DESCRIBED if stated.get(name)}
-    return {name: std for name, std in largest.items() if std > INITIAL_STD[name]}
 
 
 def named_std(covariance: NDArray[np.float64], frozen: NDArray[np.bool_]) -> dict[str, list[float]]:

@@ -60,7 +60,7 @@ def register_window(
     Parameters
     ----------
     points : (N, 3), m, lidar frame
-    times : (N,), s, lidar clock, non-decreasing
+    times : (N,), s, lidar clock, non-decreasing; a `Recording` has taken a large latency off already
     prior : poses of the IMU in the map at a uniform rate, over all `times`; without an IMU, poses
         of the lidar or of the motor that turns it
     angles : (N,), rad, encoder angle at each point, for a motor-turned lidar
@@ -166,7 +166,9 @@ def _settings(settings: ContinuousSettings | None) -> ContinuousSettings:
 
 def _calibration(calibration: Calibration | None, payload: Payload) -> Calibration:
     if calibration is None:
-        return described_calibration(payload)
+        described = described_calibration(payload)
+        # Nothing has been taken off the stamps: they come from the caller, not from a recording.
+        return replace(described, latency=described.source_latency, latency_read=0.0)
     remedy = "give that of an earlier result, or leave it out"
     return instance("calibration", calibration, Calibration, remedy)
 

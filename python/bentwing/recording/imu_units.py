@@ -23,12 +23,13 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bentwing.recording.batches import Batch
-    from bentwing.recording.sections.imu import AccelUnit
+    from bentwing.recording.sections.imu import AccelUnit, ImuUnits
 
 CHECKED = 60.0  # s of the recording's beginning; more would not change the judgement
 MIN_SAMPLES = 20
 QUIET, NO_GRAVITY = 1.0, 0.25  # s; m/s² or g
 MAX_RATE = 35.0  # rad/s, full scale of the fastest common gyros
+PLAIN_ACCEL = (9.3, 10.3)  # m/s², median length of an IMU that does not swing
 # m/s², median length; 0.3 m off the axis of a spin of 15 rad/s it is seven times gravity.
 ACCEL_RANGE = (4.0, 250.0)
 # Unit, and the range of the median length that says so.
@@ -64,17 +65,26 @@ def collect(
 
 
 def problems(
-    times: NDArray[np.float64], gyro: NDArray[np.float64], accel: NDArray[np.float64]
+    times: NDArray[np.float64],
+    gyro: NDArray[np.float64],
+    accel: NDArray[np.float64],
+    units: ImuUnits | None = None,
 ) -> list[str]:
     """Return what is certainly wrong, each with what to do.
 
     Parameters
     ----------
     times : (M,) s; gyro : (M, 3); accel : (M, 3), in whatever unit they are
+    units : by which the payload has converted them already
     """
     if len(times) < MIN_SAMPLES:
         return []
     found = [_accel_problem(times, accel), _gyro_problem(times, gyro, accel)]
+    if units is not None:
+        found += [
+            _accel_contradiction(accel, units),
+            _gyro_contradiction(times, gyro, accel, units),
+        ]
     return [problem for problem in found if problem is not None]
 
 
@@ -159,6 +169,32 @@ def _gyro_problem(
     if windows.explained_by(DEGREE):
         return f"the angular rates are in deg/s (gravity turns as slowly in the accelerations); {repair}"
     return None
+
+
+def _accel_contradiction(accel: NDArray[np.float64], units: ImuUnits) -> str | None:
+    """Return the sentence on accelerations that were in m/s² before the payload converted them."""
+    given = float(np.median(np.linalg.norm(accel, axis=1))) / ACCEL_FACTORS[units.accel]
+    if units.accel == "m/s2" or not PLAIN_ACCEL[0] < given < PLAIN_ACCEL[1]:
+        return None
+    return (
+        f"the payload says that the accelerations are in {units.accel}, but their median length of "
+        f"{given:.3g} is gravity in m/s²; remove imu.units.accel"
+    )
+
+
+def _gyro_contradiction(
+    times: NDArray[np.float64],
+    gyro: NDArray[np.float64],
+    accel: NDArray[np.float64],
+    units: ImuUnits,
+) -> str | None:
+    """Return the sentence on rates that were in rad/s before the payload converted them."""
+    if units.gyro == "rad/s" or not GravityWindows(times, gyro, accel).explained_by(1 / DEGREE):
+        return None
+    return (
+        "the payload says that the angular rates are in deg/s, but gravity turns in the accelerations "
+        "as in rad/s; remove imu.units.gyro"
+    )
 
 
 def mirrored_axis(

@@ -122,7 +122,8 @@ class Recording:
 
     def _check_imu(self) -> None:
         samples = imu_units.collect(self.imu_batches())
-        if found := imu_units.problems(*samples):
+        units = None if self.payload.imu is None else self.payload.imu.units
+        if found := imu_units.problems(*samples, units):
             msg = f"{self.imu_topic}: {'; '.join(found)}"
             raise RecordingError(msg)
         if (mirrored := imu_units.mirrored_axis(*samples)) is not None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bentwing.recording import imu_units
+from bentwing.recording import ImuUnits, imu_units
 
 G = 9.80665
 RATE_HZ = 100
@@ -128,3 +128,19 @@ def test_a_mirrored_gyro_axis_is_named(axis):
 
 def test_a_few_samples_tell_nothing():
     assert imu_units.problems(np.arange(3.0), np.ones((3, 3)), np.ones((3, 3))) == []
+
+
+@pytest.mark.parametrize("rates", [resting, handheld, spinning(6.0)])
+def test_units_that_the_payload_is_right_about_are_not_refused(rates):
+    times, gyro, accel = moving_imu(rates)
+    assert imu_units.problems(times, gyro, accel, ImuUnits(accel="g", gyro="deg/s")) == []
+
+
+def test_units_that_gravity_contradicts_are_refused():
+    times, gyro, accel = moving_imu(handheld)
+    units = ImuUnits(accel="g", gyro="deg/s")
+    found = imu_units.problems(times, np.radians(gyro), G * accel, units)
+    assert [text.rpartition("; ")[2] for text in found] == [
+        "remove imu.units.accel",
+        "remove imu.units.gyro",
+    ]

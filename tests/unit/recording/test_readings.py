@@ -118,6 +118,13 @@ def test_the_wrong_unit_is_refused_as_the_samples_in_the_right_one_were(read):
         read(ImuBatch, payload)
 
 
+def test_units_of_the_payload_that_the_samples_contradict_are_refused(read):
+    with pytest.raises(
+        RecordingError, match=r"payload says .* in g, but .* 9\.76 is gravity in m/s²"
+    ):
+        read(ImuBatch, head(imu={"units": {"accel": "g"}}))
+
+
 def test_a_clock_from_power_on_is_put_on_the_lidars_without_losing_a_nanosecond(read):
     late_ns = 12_345_678_901 - START_NS
     with pytest.raises(RecordingError, match=r"'imu: \{clock_offset: 1699999987\.654\}'"):
@@ -130,7 +137,7 @@ def test_a_clock_from_power_on_is_put_on_the_lidars_without_losing_a_nanosecond(
 
 
 def test_a_large_latency_is_taken_off_the_stamps_and_a_small_one_left_to_the_estimator(read):
-    for latency, read_off in ((0.9, 0.9), (-0.9, -0.9), (0.004, 0.0)):
+    for latency, read_off in ((0.9, 0.9), (-0.9, -0.9), (0.05, 0.0), (0.004, 0.0)):
         payload = head(lidar={"latency": latency})
         times, _ = read(LidarBatch, payload)
         start = (read.recording.start_ns - START_NS) / NS_PER_S

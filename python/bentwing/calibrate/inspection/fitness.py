@@ -80,7 +80,9 @@ def judge(recording: Recording, *, has_payload: bool) -> Judgement:
     static, scale = None, 1.0
     if len(imu.times):
         judged = imu.beginning
-        defects += [f"{recording.imu_topic}: {text}" for text in imu_units.problems(*judged)]
+        units = None if recording.payload.imu is None else recording.payload.imu.units
+        wrong = imu_units.problems(judged[0], judged[1], judged[2], units)
+        defects += [f"{recording.imu_topic}: {text}" for text in wrong]
         scale = imu_units.gyro_scale(*judged)
         start = find_static_start(judged[0], *imu_units.in_si(*judged))
         static = None if start is None else (start.start, start.end)

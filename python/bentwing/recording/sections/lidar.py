@@ -14,7 +14,7 @@ from bentwing.recording.sections.section import NonNegative, Offset, Positive, S
 
 # s; what is beyond is taken off the stamps when they are read. An estimator follows a latency from
 # where it starts, but holds inertial samples for 50 ms beyond the newest point only.
-MAX_ESTIMATED_LATENCY = 0.01
+MAX_ESTIMATED_LATENCY = 0.05
 
 
 class Lidar(Section):

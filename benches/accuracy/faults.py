@@ -160,4 +160,6 @@ def main() -> None:
             print(progress(row), file=sys.stderr, flush=True)
             results.append(row)
             options.json.write_text(json.dumps(results))
-    print(f"{table(results)}\n\n{summary(results)}")
+    if any(row["fault"] for row in results):
+        print(f"{table(results)}\n")
+    print(summary(results))

@@ -73,7 +73,11 @@ def _has_moved(trajectory: Trajectory) -> bool:
 def _judge_samples(watch: Watch) -> list[Evidence]:
     found = [] if not watch.imu.n else [*_judge_imu(watch.imu), *_judge_units(watch.track)]
     spread = watch.returns.spread
-    return [*found, Evidence("even_ranges", 1.0 / max(spread, 1e-3))]
+    return [
+        *found,
+        Evidence("even_ranges", 1.0 / max(spread, 1e-3)),
+        Evidence("scatter", watch.returns.scatter),
+    ]
 
 
 def _judge_imu(imu: ImuSamples) -> list[Evidence]:

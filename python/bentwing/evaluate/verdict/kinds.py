@@ -78,9 +78,14 @@ KINDS: dict[str, Kind] = {
         "set the IMU to 100 Hz or more",
     ),
     "even_ranges": Kind(
-        3, 20.0, 40.0,
+        3, 50.0, 100.0,
         "all returns of the lidar have nearly the same range: it saw no surroundings",
         "check the lidar and its driver",
+    ),
+    "scatter": Kind(
+        3, 0.2, 0.4,
+        "neighbouring returns of the lidar have ranges without relation: it saw no surfaces",
+        "check the lidar, its driver, and whether points and times belong together",
     ),
     "slice": Kind(
         3, 0.9, 0.98,

@@ -87,8 +87,17 @@ def watched(change=lambda _, gyro, accel: (gyro, accel), step=0.005):
     gyro, accel = change(times, gyro, accel)
     for rows in np.array_split(np.arange(len(times)), 100):
         watch.add(ImuBatch(times[rows], gyro[rows], accel[rows]))
-    watch.add(LidarBatch(rng.uniform(-9, 9, (4000, 3)), np.linspace(0, LENGTH, 4000)))
+    watch.add(room())
     return watch
+
+
+def room(length=LENGTH):
+    """Returns of a lidar that looks around between walls."""
+    turns = np.linspace(0.0, 40 * np.pi, 4000)
+    ranges = 5.0 + 2.0 * np.sin(2 * turns)
+    up = np.sin(0.3 * turns)
+    points = ranges[:, None] * np.stack([np.cos(turns), np.sin(turns), up], 1)
+    return LidarBatch(points, np.linspace(0.0, length, 4000))
 
 
 def kinds(found, watch):
@@ -212,11 +221,27 @@ def test_a_plane_that_never_turns_makes_a_slice():
 
 
 def test_returns_at_one_range_are_no_surroundings():
-    watch = Watch()
-    directions = np.random.default_rng(1).normal(size=(4000, 3))
-    sphere = 5.0 * directions / np.linalg.norm(directions, axis=1, keepdims=True)
+    watch, points = Watch(), room().points
+    sphere = 5.0 * points / np.linalg.norm(points, axis=1, keepdims=True)
     watch.add(LidarBatch(sphere, np.zeros(4000)))
-    assert "even_ranges" in kinds(estimate(), watch)
+    assert kinds(estimate(), watch) == {"even_ranges"}
+
+
+@pytest.mark.parametrize("rings", [None, np.tile(np.arange(16, dtype=np.uint16), 250)])
+def test_returns_without_relation_are_no_surfaces(rings):
+    watch, points = Watch(), room().points
+    order = np.random.default_rng(1).permutation(len(points))
+    watch.add(LidarBatch(points[order], np.zeros(4000), ring=rings))
+    assert kinds(estimate(), watch) == {"scatter"}
+
+
+def test_beams_in_turn_are_compared_with_themselves():
+    far = 1.0 + np.arange(16) % 5
+    points = np.tile(far, 250)[:, None] * np.tile([1.0, 0.2, 0.1], (4000, 1))
+    for rings in (None, np.tile(np.arange(16, dtype=np.uint16), 250)):
+        watch = Watch()
+        watch.add(LidarBatch(points, np.zeros(4000), ring=rings))
+        assert watch.returns.scatter == 0.0
 
 
 def test_a_speed_that_no_carrier_has_is_named():

@@ -44,7 +44,7 @@ class Kind:
         return self.finding.format(value=value, percent=100 * value, when=when, **evidence.facts)
 
 
-_HEAD = "check T_imu_lidar, the axes and the units of the IMU, and the clocks with `bentwing info`"
+_HEAD = "check payload.yaml, axes, units and clocks with `bentwing info`"
 
 KINDS: dict[str, Kind] = {
     "units": Kind(

@@ -108,7 +108,7 @@ KINDS: dict[str, Kind] = {
         _HEAD,
     ),
     "unseen": Kind(
-        11, 4.0, _NEVER,
+        11, 6.0, _NEVER,
         "for {value:.0f} s the surroundings show too little structure to tell where the lidar is",
         "compare the map before and after, and fly there with more structure in view",
     ),

@@ -128,6 +128,18 @@ KINDS: dict[str, Kind] = {
         "the trajectory moves otherwise than the accelerometer says, by {force:.2f} m/s²{when}",
         "check the accelerometer's axes and scale, and the unit of the ranges",
     ),
+    "gyro_noise": Kind(
+        9, 3.0, _NEVER,
+        "the gyro differs from what the lidar sees by {value:.1f} times what its noise explains{when}",
+        "check the gyro's axes and scale, the clocks, and gyro_noise in payload.yaml",
+    ),
+    "accelerometer_noise": Kind(
+        9, 3.0, _NEVER,
+        "the accelerometer differs from what the lidar sees by {value:.1f} times what its noise "
+        "explains{when}",
+        "check the accelerometer's axes and scale, the unit of the ranges, and accel_noise in "
+        "payload.yaml",
+    ),
     "clocks": Kind(
         9, 3e-4, _NEVER,
         "the clocks of lidar and IMU run apart by {milliseconds:.2f} ms a second",

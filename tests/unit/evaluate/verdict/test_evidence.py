@@ -197,6 +197,22 @@ def test_the_moments_before_the_head_has_turned_do_not_count():
     assert kinds(estimate(windows=windows), watched()) == set()
 
 
+@pytest.mark.parametrize(
+    ("changes", "kind"),
+    [({"gyro_rms": 6.0}, "gyro_noise"), ({"accel_rms": 6.0}, "accelerometer_noise")],
+)
+def test_an_imu_noisier_than_stated_is_doubted(changes, kind):
+    windows = [replace(w, **changes) for w in estimate().windows]
+    assert kinds(estimate(windows=windows), watched()) == {kind}
+
+
+def test_an_accelerometer_whose_vibration_is_not_stated_is_no_fault():
+    quiet = PAYLOAD.model_copy(update={"imu": PAYLOAD.imu.model_copy(update={"accel_noise": 8e-4})})
+    windows = [replace(w, accel_rms=15.0) for w in estimate().windows]
+    found = verdict_of(judge_estimate(estimate(windows=windows), quiet, watched()))
+    assert found.state == "good"
+
+
 def test_a_mount_far_from_the_payload_is_doubted():
     pose = Pose(np.array([0.1, 0, 0]), geometry.exp(np.radians([[0.0, 0, 9]]))[0])
     turned = replace(estimate().calibration, mount=FixedMount(pose))

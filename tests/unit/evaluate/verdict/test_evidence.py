@@ -266,6 +266,10 @@ def test_a_speed_that_no_carrier_has_is_named():
     assert "speed" in kinds(replace(found, trajectory=fast), Watch())
 
 
+def test_a_measure_that_is_no_number_has_failed():
+    assert verdict_of([Evidence("gravity", math.nan)]).state == "failed"
+
+
 @pytest.mark.parametrize(("share", "state"), [(0.99, "good"), (0.93, "doubtful"), (0.5, "failed")])
 def test_what_was_seen_again_must_fit_together(share, state):
     closed = {"n_revisits": 4, "inlier_share": share, "applied": False}

@@ -507,6 +507,22 @@ class Registration:
         """Direction (3) in the map in which the matches say least about the translation."""
 
     @property
+    def gyro_rms(self) -> float | None:
+        """Residuals of the gyro over a second, root mean square over what its noise leaves to expect."""
+
+    @property
+    def accel_rms(self) -> float | None:
+        """The same of the accelerometer."""
+
+    @property
+    def gyro_correlation(self) -> float | None:
+        """Correlation of neighbouring residuals of the gyro beyond what is expected."""
+
+    @property
+    def accel_correlation(self) -> float | None:
+        """The same of the accelerometer."""
+
+    @property
     def n_outer(self) -> int:
         """Outer iterations."""
 

@@ -7,6 +7,8 @@ import json
 
 import pytest
 
+from bentwing.simulate.faults import with_fault
+
 
 @pytest.fixture(params=["2d_only.bag", "level_2d_with_imu.bag"])
 def unfit(request, shared_cases):
@@ -27,9 +29,11 @@ def test_map_refuses_what_info_refuses_and_writes_nothing(bentwing, unfit, tmp_p
 
 def test_force_maps_it_and_the_record_says_so(bentwing, unfit, tmp_path):
     said = bentwing("map", *unfit, "-o", tmp_path / "run", "--force")
-    assert said.code == 0, said.err
+    assert said.code == 4, said.err
     record = json.loads((tmp_path / "run" / "run.json").read_text())
     assert record["settings"]["force"] is True
+    assert record["verdict"]["state"] == "failed"
+    assert {reason["kind"] for reason in record["verdict"]["reasons"]} & {"slice", "lost"}
     assert record["warnings"]
     for warning in record["warnings"]:
         assert said.err.count(warning) == 1
@@ -42,3 +46,24 @@ def test_a_car_without_an_imu_is_told_nothing_about_one(bentwing, shared_data, t
     for warning in json.loads((tmp_path / "run" / "run.json").read_text())["warnings"]:
         assert said.err.count(warning) == 1
     assert "IMU" not in said.err
+
+
+def test_a_map_that_is_wrong_ends_with_exit_code_4_and_all_files(office, bentwing, tmp_path):
+    """The gyro turns the other way; nothing in the samples themselves shows it."""
+    with_fault(office / "recording.bag", office / "payload.yaml", "gyro-negated", tmp_path, seed=1)
+    out = tmp_path / "run"
+    said = bentwing(
+        "map", tmp_path / "recording.bag", "-p", tmp_path / "payload.yaml", "-o", out,
+        "--map-spacing", "0.1", "--threads", "1",
+    )  # fmt: skip
+    assert said.code == 4
+    assert f"bentwing: error: {out}: failed: " in said.err
+    assert "open" in said.err
+    assert str(out / "report.html") in said.err
+    record = json.loads((out / "run.json").read_text())
+    assert record["complete"] is True
+    assert record["verdict"]["state"] == "failed"
+    assert all((out / name).exists() for name in ("trajectory.txt", "map.laz", "report.html"))
+    page = (out / "report.html").read_text()
+    assert "Failed: this map is wrong, do not use it" in page
+    assert "Map finished" not in page

@@ -396,6 +396,30 @@ impl Registration {
             .into()
     }
 
+    /// Residuals of the gyro over a second, root mean square over what its noise leaves to expect.
+    #[getter]
+    fn gyro_rms(&self) -> Option<f64> {
+        self.0.imu_fit.gyro.map(|fit| fit.rms)
+    }
+
+    /// The same of the accelerometer.
+    #[getter]
+    fn accel_rms(&self) -> Option<f64> {
+        self.0.imu_fit.accel.map(|fit| fit.rms)
+    }
+
+    /// Correlation of neighbouring residuals of the gyro beyond what is expected.
+    #[getter]
+    fn gyro_correlation(&self) -> Option<f64> {
+        self.0.imu_fit.gyro.map(|fit| fit.correlation)
+    }
+
+    /// The same of the accelerometer.
+    #[getter]
+    fn accel_correlation(&self) -> Option<f64> {
+        self.0.imu_fit.accel.map(|fit| fit.correlation)
+    }
+
     /// Outer iterations.
     #[getter]
     fn n_outer(&self) -> usize {

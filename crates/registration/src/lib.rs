@@ -26,5 +26,6 @@ pub use system::{
     NormalEquations, PoseResponse, RowGroup, Solution, SolveError, Solver, System, UNMOVED, follow,
 };
 pub use window::{
-    FixedView, Initial, Posterior, Problem, Registration, first_equations, register_window,
+    Fit, FixedView, ImuFit, Initial, Posterior, Problem, Registration, first_equations,
+    register_window,
 };

@@ -61,7 +61,7 @@ impl StepSize {
 /// What changes from iteration to iteration, and what it is held by.
 pub(crate) struct State<'a> {
     pub prior: &'a GlobalPrior,
-    imu: Option<&'a Imu>,
+    pub imu: Option<&'a Imu>,
     /// Samples that rest.
     rests: Vec<Range<usize>>,
     pub trajectory: Trajectory,

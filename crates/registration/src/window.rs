@@ -2,6 +2,7 @@
 //! The registration: the paper on one screen.
 
 mod fixed_view;
+mod imu_fit;
 mod matches;
 mod posterior;
 
@@ -12,6 +13,7 @@ use bentwing_trajectory::{CorrectionSpline, Imu, Trajectory};
 use nalgebra::Matrix6;
 
 pub use fixed_view::FixedView;
+pub use imu_fit::{Fit, ImuFit};
 use matches::MatchRows;
 pub use posterior::Posterior;
 
@@ -78,6 +80,8 @@ pub struct Registration {
     pub converged: bool,
     /// Samples of the trajectory without inertial data.
     pub n_blind: usize,
+    /// How well the trajectory agrees with the IMU.
+    pub imu_fit: ImuFit,
     /// The last equations.
     pub posterior: Posterior,
 }
@@ -143,7 +147,7 @@ pub fn register_window(
         let converged = step_size.converged(settings);
         if converged || n_outer >= settings.max_outer {
             let n_surfels = placed.surfels.len();
-            return Ok(last.result(state, ties, n_surfels, n_outer, converged));
+            return Ok(last.result(state, settings, ties, n_surfels, n_outer, converged));
         }
     }
 }
@@ -215,12 +219,23 @@ impl Solved {
     fn result(
         self,
         state: State<'_>,
+        settings: &Settings,
         ties: Vec<PoseResponse>,
         n_surfels: usize,
         n_outer: usize,
         converged: bool,
     ) -> Registration {
         let marginals = self.factorized.marginals(&ties);
+        let solved = imu_fit::Solved {
+            trajectory: &state.trajectory,
+            globals: &state.globals,
+            spline: &state.spline,
+            factorized: &self.factorized,
+            ties: &ties,
+        };
+        let imu_fit = state
+            .imu
+            .map(|imu| solved.imu_fit(imu, &settings.imu_noise));
         Registration {
             responses: response::at_samples(&marginals.responses, &state.trajectory, &state.spline),
             trajectory: state.trajectory,
@@ -232,6 +247,7 @@ impl Solved {
             n_outer,
             converged,
             n_blind: state.n_blind,
+            imu_fit: imu_fit.unwrap_or_default(),
             posterior: Posterior {
                 factorized: self.factorized,
                 ties,

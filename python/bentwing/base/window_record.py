@@ -28,6 +28,10 @@ class WindowRecord:
     new_share : share of the features where nothing was seen before (filter)
     inlier_share : share of the matches that agree within two standard deviations
     residual_rms : of the matches, in units of the expected noise
+    gyro_rms, accel_rms : residuals of the IMU over a second, in units of what its stated noise leaves to
+        expect; None where the lidar cannot say (windows)
+    gyro_correlation, accel_correlation : of residuals half a second apart, mean of the axes, beyond what
+        is expected: 0 where the noise is white, towards 1 where it is an error that lasts (windows)
     registration_rmse : root mean square distance from the reference, m (filter, NDT; Tazir 2020,
         figure 13)
     iterations : how often the matches were renewed
@@ -54,6 +58,10 @@ class WindowRecord:
     new_share: float | None = None
     inlier_share: float | None
     residual_rms: float | None
+    gyro_rms: float | None = None
+    accel_rms: float | None = None
+    gyro_correlation: float | None = None
+    accel_correlation: float | None = None
     registration_rmse: float | None = None
     iterations: int
     converged: bool

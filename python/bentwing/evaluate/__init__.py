@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from bentwing.evaluate.evaluation import Evaluation, Question, evaluate
     from bentwing.evaluate.subject import Subject, find_subject
     from bentwing.evaluate.trajectory import AbsoluteError, Drift, absolute_error, drift
+    from bentwing.evaluate.verdict.verdict import Reason, Verdict
 else:
     from bentwing.base.lazy import lazy
 
@@ -18,6 +19,7 @@ else:
             "evaluate.evaluation": ["Evaluation", "Question", "evaluate"],
             "evaluate.subject": ["Subject", "find_subject"],
             "evaluate.trajectory": ["AbsoluteError", "Drift", "absolute_error", "drift"],
+            "evaluate.verdict.verdict": ["Reason", "Verdict"],
         },
     )
 
@@ -26,7 +28,9 @@ __all__ = [
     "Drift",
     "Evaluation",
     "Question",
+    "Reason",
     "Subject",
+    "Verdict",
     "absolute_error",
     "drift",
     "evaluate",

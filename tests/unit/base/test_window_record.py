@@ -12,7 +12,7 @@ COMMON = {
     "translation_eigenvalues": [0.1, 0.3, 0.6], "rotation_eigenvalues": [0.2, 0.3, 0.5],
 }  # fmt: skip
 WINDOW = COMMON | {
-    "n_fixed_matches": 4, "weakest_direction": None, "n_blind": 0, "latency": 0.003,
+    "n_fixed_matches": 4, "weakest_direction": None, "n_blind": 0, "gyro_rms": 0.9, "gyro_correlation": 0.1, "latency": 0.003,
     "gyro_bias": [0.0] * 3, "accel_bias": [0.0] * 3, "gravity": [0.0, 0.0, 9.8],
     "extrinsic_translation": [0.0] * 3, "extrinsic_quat_xyzw": [0.0, 0.0, 0.0, 1.0],
     "std": {"latency": [1e-4]},

@@ -5,7 +5,7 @@ use bentwing_trajectory::{CorrectionSpline, Imu, NodeForce, Trajectory, so3};
 use nalgebra::{Matrix3, Vector3};
 
 use super::stencil::{StencilRows, add_stencil};
-use crate::{Globals, ImuNoise, NormalEquations, index};
+use crate::{GlobalVector, Globals, ImuNoise, N_GLOBALS, NormalEquations, index};
 
 /// `e = dθ_n/dt − b_g − Log(R_nᵀ R_{n+1})/dt`, rad/s, imu frame.
 pub fn gyro_residual(
@@ -28,6 +28,25 @@ pub fn accel_residual(
     node.force - node.bias_gain * globals.accel_bias - trajectory.rotations()[n].inverse() * force
 }
 
+/// What the IMU says at one sample: three rows of the control points `first .. first + 5`.
+pub(crate) struct SampleRows {
+    pub first: usize,
+    pub residual: Vector3<f64>,
+    pub knots: [[f64; 30]; 3],
+    pub globals: [GlobalVector; 3],
+}
+
+impl SampleRows {
+    fn add(&self, rows: &mut StencilRows<'_>, sigma: f64) {
+        let group = rows.group(self.first);
+        for row in 0..3 {
+            group.knots_mut().copy_from_slice(&self.knots[row]);
+            group.globals_mut().copy_from_slice(&self.globals[row]);
+            group.add(self.residual[row], sigma.powi(-2));
+        }
+    }
+}
+
 /// Adds the rows of all samples; returns the number of samples without inertial data.
 pub fn add(
     equations: &mut NormalEquations,
@@ -40,54 +59,76 @@ pub fn add(
     let mut rows = StencilRows::new(equations);
     let mut n_blind = 0;
     for n in 0..trajectory.len() - 1 {
-        let turned = imu.rotation_increment(trajectory.time(n), trajectory.time(n + 1));
-        match turned {
-            Some(turned) => add_gyro(&mut rows, trajectory, globals, spline, noise, n, &turned),
+        match gyro_rows(trajectory, imu, globals, spline, n) {
+            Some(said) => said.add(&mut rows, noise.gyro),
             None => n_blind += 1,
         }
         if n > 0
-            && let Some(node) = imu.node_force(trajectory, n)
+            && let Some(said) = accel_rows(trajectory, imu, globals, spline, n)
         {
-            add_accel(&mut rows, trajectory, globals, spline, noise, n, &node);
+            said.add(&mut rows, noise.accel);
         }
     }
     rows.flush();
     n_blind
 }
 
-fn add_gyro(
-    rows: &mut StencilRows<'_>,
+/// What the gyro says of the turn from sample `n` to the next one; `None` in a gap.
+pub(crate) fn gyro_rows(
+    trajectory: &Trajectory,
+    imu: &Imu,
+    globals: &Globals,
+    spline: &CorrectionSpline,
+    n: usize,
+) -> Option<SampleRows> {
+    let turned = imu.rotation_increment(trajectory.time(n), trajectory.time(n + 1))?;
+    Some(gyro_rows_of(trajectory, globals, spline, n, &turned))
+}
+
+/// What the accelerometer says around sample `n`; `None` in a gap. `1 <= n < len - 1`.
+pub(crate) fn accel_rows(
+    trajectory: &Trajectory,
+    imu: &Imu,
+    globals: &Globals,
+    spline: &CorrectionSpline,
+    n: usize,
+) -> Option<SampleRows> {
+    let node = imu.node_force(trajectory, n)?;
+    Some(accel_rows_of(trajectory, globals, spline, n, &node))
+}
+
+fn gyro_rows_of(
     trajectory: &Trajectory,
     globals: &Globals,
     spline: &CorrectionSpline,
-    noise: &ImuNoise,
     n: usize,
     turned: &Vector3<f64>,
-) {
+) -> SampleRows {
     let dt = trajectory.dt();
     let times = [trajectory.time(n), trajectory.time(n + 1)];
     let stencil = spline.stencil(times, [-1.0 / dt, 1.0 / dt]);
     let R_next = so3::matrix(&trajectory.rotations()[n + 1]);
     let J = -so3::right_jacobian_inverse(&trajectory.steps()[n]) * R_next.transpose();
-    let e = gyro_residual(trajectory, globals, n, turned);
-    let group = rows.group(stencil.first);
+    let mut rows = SampleRows {
+        first: stencil.first,
+        residual: gyro_residual(trajectory, globals, n, turned),
+        knots: [[0.0; 30]; 3],
+        globals: [[0.0; N_GLOBALS]; 3],
+    };
     for row in 0..3 {
-        group.clear_row();
-        add_stencil(group.knots_mut(), &stencil, &J, row, 0);
-        group.globals_mut()[index::GYRO_BIAS.start + row] = -1.0;
-        group.add(e[row], noise.gyro.powi(-2));
+        add_stencil(&mut rows.knots[row], &stencil, &J, row, 0);
+        rows.globals[row][index::GYRO_BIAS.start + row] = -1.0;
     }
+    rows
 }
 
-fn add_accel(
-    rows: &mut StencilRows<'_>,
+fn accel_rows_of(
     trajectory: &Trajectory,
     globals: &Globals,
     spline: &CorrectionSpline,
-    noise: &ImuNoise,
     n: usize,
     node: &NodeForce,
-) {
+) -> SampleRows {
     let (t, dt) = (trajectory.time(n), trajectory.dt());
     let times = [t - dt, t, t + dt];
     let d2 = 1.0 / (dt * dt);
@@ -97,21 +138,24 @@ fn add_accel(
     let force = trajectory.acceleration(n) + globals.gravity;
     let J_rotation = -R_imu_map * so3::hat(&force);
     let J_gravity: Matrix3<f64> = R_imu_map * so3::hat(&globals.gravity);
-    let e = accel_residual(trajectory, globals, n, node);
-    let group = rows.group(curvature.first);
+    let mut rows = SampleRows {
+        first: curvature.first,
+        residual: accel_residual(trajectory, globals, n, node),
+        knots: [[0.0; 30]; 3],
+        globals: [[0.0; N_GLOBALS]; 3],
+    };
     for row in 0..3 {
-        group.clear_row();
-        add_stencil(group.knots_mut(), &curvature, &-R_imu_map, row, 3);
-        add_stencil(group.knots_mut(), &value, &J_rotation, row, 0);
-        let g = group.globals_mut();
+        add_stencil(&mut rows.knots[row], &curvature, &-R_imu_map, row, 3);
+        add_stencil(&mut rows.knots[row], &value, &J_rotation, row, 0);
+        let g = &mut rows.globals[row];
         for c in 0..3 {
             g[index::ACCEL_BIAS.start + c] = -node.bias_gain[(row, c)];
         }
         for c in 0..2 {
             g[index::GRAVITY.start + c] = J_gravity[(row, c)];
         }
-        group.add(e[row], noise.accel.powi(-2));
     }
+    rows
 }
 
 #[cfg(test)]
@@ -124,16 +168,16 @@ mod tests {
         #[test]
         fn gyro_rows_agree_with_central_differences(scene in Scene::any(), n in 1..40_usize) {
             let turned = Vector3::new(0.01, -0.03, 0.05);
-            let noise = ImuNoise { gyro: 0.7, accel: 1.0 };
+            let sigma = 0.7;
             assert_rows(
                 &scene,
                 |equations| {
                     let mut rows = StencilRows::new(equations);
                     let (t, g) = (&scene.trajectory, &scene.globals);
-                    add_gyro(&mut rows, t, g, &scene.spline(), &noise, n, &turned);
+                    gyro_rows_of(t, g, &scene.spline(), n, &turned).add(&mut rows, sigma);
                     rows.flush();
                 },
-                |t, g| (gyro_residual(t, g, n, &turned) / noise.gyro).as_slice().to_vec(),
+                |t, g| (gyro_residual(t, g, n, &turned) / sigma).as_slice().to_vec(),
             )?;
         }
 
@@ -143,16 +187,16 @@ mod tests {
                 force: Vector3::new(0.3, -1.0, 9.0),
                 bias_gain: Matrix3::identity() * 0.98,
             };
-            let noise = ImuNoise { gyro: 1.0, accel: 0.3 };
+            let sigma = 0.3;
             assert_rows(
                 &scene,
                 |equations| {
                     let mut rows = StencilRows::new(equations);
                     let (t, g) = (&scene.trajectory, &scene.globals);
-                    add_accel(&mut rows, t, g, &scene.spline(), &noise, n, &node);
+                    accel_rows_of(t, g, &scene.spline(), n, &node).add(&mut rows, sigma);
                     rows.flush();
                 },
-                |t, g| (accel_residual(t, g, n, &node) / noise.accel).as_slice().to_vec(),
+                |t, g| (accel_residual(t, g, n, &node) / sigma).as_slice().to_vec(),
             )?;
         }
     }

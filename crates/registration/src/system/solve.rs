@@ -141,21 +141,31 @@ impl Factorized {
 
     /// Joint covariance of the control points `controls`; `ties` are the responses of clamped ones.
     pub fn covariance(&self, controls: Range<usize>, ties: &[PoseResponse]) -> DMatrix<f64> {
-        let mut rows = Mat::<f64>::zeros(self.layout.len(), 6 * controls.len());
-        for (i, control) in controls.enumerate() {
-            for part in 0..6 {
-                let column = rows.col_as_slice_mut(6 * i + part);
-                if let Some(first) = self.layout.knot(control) {
-                    column[first + part] = 1.0;
-                } else if let Some(tie) = ties.get(control) {
-                    let globals = &mut column[self.layout.n_knot_unknowns()..];
-                    for (entry, &g) in globals.iter_mut().zip(&self.layout.active) {
-                        *entry = tie[part][g];
-                    }
-                }
+        let (first, n) = (6 * controls.start, 6 * controls.len());
+        let mut units = Mat::<f64>::zeros(6 * self.layout.n_controls + N_GLOBALS, n);
+        for i in 0..n {
+            units[(first + i, i)] = 1.0;
+        }
+        self.covariance_of(&units, ties)
+    }
+
+    /// Joint covariance of linear functions of the unknowns: each column of `rows` has six entries
+    /// per control point, then those of the global states.
+    pub fn covariance_of(&self, rows: &Mat<f64>, ties: &[PoseResponse]) -> DMatrix<f64> {
+        let n_knots = 6 * self.layout.n_controls;
+        let mut free = Mat::<f64>::zeros(self.layout.len(), rows.ncols());
+        for j in 0..rows.ncols() {
+            let (knots, globals) = rows.col_as_slice(j).split_at(n_knots);
+            let (of_knots, of_globals) = free
+                .col_as_slice_mut(j)
+                .split_at_mut(self.layout.n_knot_unknowns());
+            of_knots.copy_from_slice(&knots[6 * self.layout.n_clamped..]);
+            for (entry, &g) in of_globals.iter_mut().zip(&self.layout.active) {
+                let tied = ties.as_flattened().iter().zip(knots);
+                *entry = globals[g] + tied.map(|(tie, knot)| tie[g] * knot).sum::<f64>();
             }
         }
-        let joint = rows.transpose() * self.factor.solve(&rows);
+        let joint = free.transpose() * self.factor.solve(&free);
         let n = joint.nrows();
         DMatrix::from_fn(n, n, |i, j| 0.5 * (joint[(i, j)] + joint[(j, i)]))
     }

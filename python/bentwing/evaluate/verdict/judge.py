@@ -12,6 +12,7 @@ from bentwing.evaluate.verdict.head import judge_calibration, judge_clocks, judg
 from bentwing.evaluate.verdict.inertial import judge_inertial
 from bentwing.evaluate.verdict.matches import judge_matches
 from bentwing.evaluate.verdict.path import judge_path
+from bentwing.evaluate.verdict.rows import judge_rows
 from bentwing.evaluate.verdict.verdict import verdict_of
 from bentwing.recording import imu_units
 
@@ -36,6 +37,7 @@ def judge_estimate(estimate: Estimate, payload: Payload, watch: Watch) -> list[E
         *_judge_samples(watch),
         *judge_matches(estimate.windows),
         *judge_inertial(estimate, watch.track, payload.imu),
+        *judge_rows(estimate.windows, payload.imu),
         *judge_calibration(calibration, payload),
         *judge_clocks(estimate.windows),
         *judge_slice(estimate.trajectory, calibration, watch.returns.normal),
@@ -73,7 +75,11 @@ def _has_moved(trajectory: Trajectory) -> bool:
 def _judge_samples(watch: Watch) -> list[Evidence]:
     found = [] if not watch.imu.n else [*_judge_imu(watch.imu), *_judge_units(watch.track)]
     spread = watch.returns.spread
-    return [*found, Evidence("even_ranges", 1.0 / max(spread, 1e-3))]
+    return [
+        *found,
+        Evidence("even_ranges", 1.0 / max(spread, 1e-3)),
+        Evidence("scatter", watch.returns.scatter),
+    ]
 
 
 def _judge_imu(imu: ImuSamples) -> list[Evidence]:

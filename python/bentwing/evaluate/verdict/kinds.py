@@ -44,7 +44,7 @@ class Kind:
         return self.finding.format(value=value, percent=100 * value, when=when, **evidence.facts)
 
 
-_HEAD = "check T_imu_lidar, the axes and the units of the IMU, and the clocks with `bentwing info`"
+_HEAD = "check payload.yaml, axes, units and clocks with `bentwing info`"
 
 KINDS: dict[str, Kind] = {
     "units": Kind(
@@ -78,9 +78,14 @@ KINDS: dict[str, Kind] = {
         "set the IMU to 100 Hz or more",
     ),
     "even_ranges": Kind(
-        3, 20.0, 40.0,
+        3, 50.0, 100.0,
         "all returns of the lidar have nearly the same range: it saw no surroundings",
         "check the lidar and its driver",
+    ),
+    "scatter": Kind(
+        3, 0.2, 0.4,
+        "neighbouring returns of the lidar have ranges without relation: it saw no surfaces",
+        "check the lidar, its driver, and whether points and times belong together",
     ),
     "slice": Kind(
         3, 0.9, 0.98,
@@ -103,7 +108,7 @@ KINDS: dict[str, Kind] = {
         _HEAD,
     ),
     "unseen": Kind(
-        11, 4.0, _NEVER,
+        11, 6.0, _NEVER,
         "for {value:.0f} s the surroundings show too little structure to tell where the lidar is",
         "compare the map before and after, and fly there with more structure in view",
     ),
@@ -122,6 +127,18 @@ KINDS: dict[str, Kind] = {
         8, 0.5, 3.0,
         "the trajectory moves otherwise than the accelerometer says, by {force:.2f} m/s²{when}",
         "check the accelerometer's axes and scale, and the unit of the ranges",
+    ),
+    "gyro_noise": Kind(
+        9, 3.0, _NEVER,
+        "the gyro differs from what the lidar sees by {value:.1f} times what its noise explains{when}",
+        "check the gyro's axes and scale, the clocks, and gyro_noise in payload.yaml",
+    ),
+    "accelerometer_noise": Kind(
+        9, 3.0, _NEVER,
+        "the accelerometer differs from what the lidar sees by {value:.1f} times what its noise "
+        "explains{when}",
+        "check the accelerometer's axes and scale, the unit of the ranges, and accel_noise in "
+        "payload.yaml",
     ),
     "clocks": Kind(
         9, 3e-4, _NEVER,

@@ -19,6 +19,11 @@ _EVERY = 37
 # A 3D lidar shows itself in the first batches.
 _JUDGED = 10
 _FEWEST = 3
+# Neighbours are looked at in one of so many batches, so many returns of it.
+_LOOKS, _LOOKED, _MOST = 10, 4000, 500
+_FEWEST_STEPS = 20
+# A return whose neighbour is known by no beam number has it one of so many returns before.
+_STRIDES = (1, 2, 4, 6, 8, 16, 32, 64, 128)
 
 
 class Returns:
@@ -34,6 +39,8 @@ class Returns:
         self._n_judged = 0
         self._n = 0
         self._sums = np.zeros(2)
+        self._n_batches = 0
+        self._steps: list[float] = []
 
     def add(self, batch: LidarBatch) -> None:
         """Take the next returns."""
@@ -43,6 +50,9 @@ class Returns:
         ranges = np.log(np.maximum(np.linalg.norm(some, axis=1), 1e-3))
         self._n += len(ranges)
         self._sums += ranges.sum(), (ranges**2).sum()
+        if self._n_batches % _LOOKS == 0 and len(self._steps) < _MOST:
+            self._look(batch)
+        self._n_batches += 1
 
     @property
     def spread(self) -> float:
@@ -52,9 +62,32 @@ class Returns:
         mean, square = self._sums / self._n
         return float(np.sqrt(max(square - mean**2, 0.0)))
 
+    @property
+    def scatter(self) -> float:
+        """How far a return's range usually is from its neighbour's, as a logarithm; zero without returns."""
+        return float(np.median(self._steps)) if self._steps else 0.0
+
+    def _look(self, batch: LidarBatch) -> None:
+        logs = np.log(np.maximum(np.linalg.norm(batch.points[:_LOOKED], axis=1), 1e-3))
+        if batch.ring is not None:
+            rings = batch.ring[:_LOOKED]
+            beams, counts = np.unique(rings, return_counts=True)
+            steps = [_step(logs[rings == beams[np.argmax(counts)]], 1)]
+        else:
+            steps = [_step(logs, stride) for stride in _STRIDES]
+        if known := [step for step in steps if step is not None]:
+            self._steps.append(min(known))
+
     def _judge(self, points: NDArray[np.float64]) -> None:
         self._n_judged += 1
         if is_plane(points):
             self.normal = np.linalg.eigh(np.cov(points.T))[1][:, 0]
         else:
             self.normal, self._n_judged = None, _JUDGED
+
+
+def _step(logs: NDArray[np.float64], stride: int) -> float | None:
+    """Median step between ranges (N,), as logarithms; None of too few."""
+    if len(logs) < stride + _FEWEST_STEPS:
+        return None
+    return float(np.median(np.abs(logs[stride:] - logs[:-stride])))

@@ -44,8 +44,10 @@ class OverTime:
         return float(np.quantile(self.values, _WORST)) if len(self.values) else 0.0
 
     def spans_over(self, kind: str, scale: Callable[[Array], Array]) -> tuple[Span, ...]:
-        """Return when the measure is beyond what is doubtful."""
+        """Return when the measure is beyond what is doubtful; nothing if it always is."""
         beyond = scale(self.values) > KINDS[kind].doubtful
+        if beyond.all():
+            return ()
         return tuple(spans_of(zip(self.ends.tolist(), beyond.tolist(), strict=True)))
 
 

@@ -129,11 +129,11 @@ def verdict_of(evidence: Iterable[Evidence], judged: Iterable[Reason] = ()) -> V
 
 def _reason(evidence: Evidence) -> Reason | None:
     kind, value = KINDS[evidence.kind], evidence.value
-    if not value > kind.doubtful:
+    if value <= kind.doubtful:
         return None
     return Reason(
         evidence.kind,
-        "failed" if value > kind.failed else "doubtful",
+        "doubtful" if value <= kind.failed else "failed",  # what is no number has failed
         kind.sentence(evidence),
         kind.advice,
         value,

@@ -87,8 +87,17 @@ def watched(change=lambda _, gyro, accel: (gyro, accel), step=0.005):
     gyro, accel = change(times, gyro, accel)
     for rows in np.array_split(np.arange(len(times)), 100):
         watch.add(ImuBatch(times[rows], gyro[rows], accel[rows]))
-    watch.add(LidarBatch(rng.uniform(-9, 9, (4000, 3)), np.linspace(0, LENGTH, 4000)))
+    watch.add(room())
     return watch
+
+
+def room(length=LENGTH):
+    """Returns of a lidar that looks around between walls."""
+    turns = np.linspace(0.0, 40 * np.pi, 4000)
+    ranges = 5.0 + 2.0 * np.sin(2 * turns)
+    up = np.sin(0.3 * turns)
+    points = ranges[:, None] * np.stack([np.cos(turns), np.sin(turns), up], 1)
+    return LidarBatch(points, np.linspace(0.0, length, 4000))
 
 
 def kinds(found, watch):
@@ -188,6 +197,22 @@ def test_the_moments_before_the_head_has_turned_do_not_count():
     assert kinds(estimate(windows=windows), watched()) == set()
 
 
+@pytest.mark.parametrize(
+    ("changes", "kind"),
+    [({"gyro_rms": 6.0}, "gyro_noise"), ({"accel_rms": 6.0}, "accelerometer_noise")],
+)
+def test_an_imu_noisier_than_stated_is_doubted(changes, kind):
+    windows = [replace(w, **changes) for w in estimate().windows]
+    assert kinds(estimate(windows=windows), watched()) == {kind}
+
+
+def test_an_accelerometer_whose_vibration_is_not_stated_is_no_fault():
+    quiet = PAYLOAD.model_copy(update={"imu": PAYLOAD.imu.model_copy(update={"accel_noise": 8e-4})})
+    windows = [replace(w, accel_rms=15.0) for w in estimate().windows]
+    found = verdict_of(judge_estimate(estimate(windows=windows), quiet, watched()))
+    assert found.state == "good"
+
+
 def test_a_mount_far_from_the_payload_is_doubted():
     pose = Pose(np.array([0.1, 0, 0]), geometry.exp(np.radians([[0.0, 0, 9]]))[0])
     turned = replace(estimate().calibration, mount=FixedMount(pose))
@@ -212,17 +237,37 @@ def test_a_plane_that_never_turns_makes_a_slice():
 
 
 def test_returns_at_one_range_are_no_surroundings():
-    watch = Watch()
-    directions = np.random.default_rng(1).normal(size=(4000, 3))
-    sphere = 5.0 * directions / np.linalg.norm(directions, axis=1, keepdims=True)
+    watch, points = Watch(), room().points
+    sphere = 5.0 * points / np.linalg.norm(points, axis=1, keepdims=True)
     watch.add(LidarBatch(sphere, np.zeros(4000)))
-    assert "even_ranges" in kinds(estimate(), watch)
+    assert kinds(estimate(), watch) == {"even_ranges"}
+
+
+@pytest.mark.parametrize("rings", [None, np.tile(np.arange(16, dtype=np.uint16), 250)])
+def test_returns_without_relation_are_no_surfaces(rings):
+    watch, points = Watch(), room().points
+    order = np.random.default_rng(1).permutation(len(points))
+    watch.add(LidarBatch(points[order], np.zeros(4000), ring=rings))
+    assert kinds(estimate(), watch) == {"scatter"}
+
+
+def test_beams_in_turn_are_compared_with_themselves():
+    far = 1.0 + np.arange(16) % 5
+    points = np.tile(far, 250)[:, None] * np.tile([1.0, 0.2, 0.1], (4000, 1))
+    for rings in (None, np.tile(np.arange(16, dtype=np.uint16), 250)):
+        watch = Watch()
+        watch.add(LidarBatch(points, np.zeros(4000), ring=rings))
+        assert watch.returns.scatter == 0.0
 
 
 def test_a_speed_that_no_carrier_has_is_named():
     found = estimate()
     fast = replace(found.trajectory, positions=100.0 * found.trajectory.positions)
     assert "speed" in kinds(replace(found, trajectory=fast), Watch())
+
+
+def test_a_measure_that_is_no_number_has_failed():
+    assert verdict_of([Evidence("gravity", math.nan)]).state == "failed"
 
 
 @pytest.mark.parametrize(("share", "state"), [(0.99, "good"), (0.93, "doubtful"), (0.5, "failed")])

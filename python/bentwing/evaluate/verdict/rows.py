@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""Whether windows find the IMU as noisy as it is stated to be, gyro and accelerometer apart."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bentwing.evaluate.verdict.evidence import Evidence
+from bentwing.evaluate.verdict.stretches import over_time
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from bentwing.base.window_record import WindowRecord
+    from bentwing.recording.payload import Imu
+
+# Densities that any carrier has, rad/s/√Hz and m/s²/√Hz: who states less has not thought of vibration,
+# and that is no fault of the set-up.
+_GYRO_FLOOR, _ACCEL_FLOOR = 5e-4, 0.01
+_FEWEST = 4  # windows that can say something
+
+
+def judge_rows(windows: Sequence[WindowRecord], imu: Imu | None) -> list[Evidence]:
+    """Judge by the residuals of the IMU in windows, in units of what its noise leaves to expect."""
+    if imu is None:
+        return []
+    gyro = [(w.time, w.gyro_rms) for w in windows if w.gyro_rms is not None]
+    accel = [(w.time, w.accel_rms) for w in windows if w.accel_rms is not None]
+    return [
+        *_judge("gyro_noise", gyro, imu.gyro_noise, _GYRO_FLOOR),
+        *_judge("accelerometer_noise", accel, imu.accel_noise, _ACCEL_FLOOR),
+    ]
+
+
+def _judge(
+    kind: str, known: Sequence[tuple[float, float]], stated: float, floor: float
+) -> list[Evidence]:
+    if len(known) < _FEWEST:
+        return []
+    times, values = np.array(known).T
+    found = over_time(times, values * stated / np.hypot(stated, floor))
+    return [Evidence(kind, found.high, found.spans_over(kind, np.asarray))]

@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""What the windows of the continuous estimator say of the IMU's noise."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bentwing.recording import ImuBatch
+
+NAMES = ("gyro_rms", "accel_rms", "gyro_correlation", "accel_correlation")
+
+
+def said(estimate):
+    """Columns of `NAMES` of the windows that say all of them."""
+    rows = [[getattr(w, name) for name in NAMES] for w in estimate.windows]
+    return np.array([row for row in rows if None not in row])
+
+
+@pytest.fixture
+def flown_with(heads, run):
+    def fly(change):
+        batches = [change(b) if isinstance(b, ImuBatch) else b for b in heads("continuous").batches]
+        return said(run("continuous", batches=batches))
+
+    return fly
+
+
+def test_the_noise_of_a_good_flight_is_as_stated_and_white(plain_run):
+    found = said(plain_run("continuous"))
+    assert len(found) >= 3
+    # Five means in three axes each; a payload may state up to twice the noise it has.
+    assert np.all(np.median(found[:, :2], axis=0) > 0.4)
+    assert np.all(np.median(found[:, :2], axis=0) < 1.5)
+    assert np.all(np.abs(np.median(found[:, 2:], axis=0)) < 0.4)
+
+
+def test_a_gyro_of_the_wrong_scale_shows_in_its_residuals(flown_with):
+    found = flown_with(lambda batch: replace(batch, gyro=1.1 * batch.gyro))
+    assert np.max(found[:, 0]) > 3.0
+
+
+def test_a_noisier_gyro_shows_in_its_residuals_alone(plain_run, flown_with):
+    rng = np.random.default_rng(4)
+
+    def noisier(batch):
+        return replace(batch, gyro=batch.gyro + rng.normal(0.0, 0.03, batch.gyro.shape))
+
+    good, bad = (np.median(f, axis=0) for f in (said(plain_run("continuous")), flown_with(noisier)))
+    assert bad[0] > 2.0 * good[0]
+    assert bad[1] < 1.5 * good[1]

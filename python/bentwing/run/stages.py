@@ -14,6 +14,7 @@ from bentwing.closing.georeference.georeference import georeference
 from bentwing.closing.global_registration import Budget, close_loops
 from bentwing.closing.joining.segments import close_segments
 from bentwing.closing.localize import Difference, NotInMapError, find_in_map
+from bentwing.evaluate.expected import expected_accuracy
 from bentwing.map.project import project
 from bentwing.run.found import Found, Reading, Spin
 from bentwing.run.mapping import MapSource, write_map
@@ -154,7 +155,8 @@ def place_on_earth(job: Job, found: Found) -> Found:
     if placed is None:
         return found
     if placed.trajectory is not estimate.trajectory:
-        estimate = replace(estimate, trajectory=placed.trajectory)
+        # Bent by fixes, it is no longer what the covariances are of.
+        estimate = replace(estimate, trajectory=placed.trajectory, covariances=None)
     warnings = (*found.stage_warnings, *placed.warnings)
     return replace(found, estimate=estimate, placed=placed, stage_warnings=warnings)
 
@@ -176,7 +178,9 @@ def make_map(job: Job, found: Found) -> Found:
             placed=found.placed,
             difference=difference,
         )
-    return replace(found, map=written)
+    sigma = part.payload.lidar.range_sigma
+    accuracy = expected_accuracy(estimate.trajectory, estimate.covariances, sigma)
+    return replace(found, map=written, accuracy=accuracy)
 
 
 def _known(found: Found) -> Estimate:

@@ -21,9 +21,9 @@ import numpy as np
 from benches.support import tables
 from benches.support.axis import about_axis
 from bentwing.base import geometry
+from bentwing.base.covariances import levelled_covariances
 from bentwing.base.mount import FixedMount
 from bentwing.evaluate.nees import (
-    levelled_covariances,
     nees,
     nees_bounds,
     pose_errors_from,

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from bentwing import simulate as simulate
     from bentwing.base.breaks import Break
     from bentwing.base.calibration import Calibration
+    from bentwing.base.covariances import PoseCovariances
     from bentwing.base.errors import (
         BentwingError,
         DivergedError,
@@ -55,6 +56,7 @@ else:
         {
             "base.breaks": ["Break"],
             "base.calibration": ["Calibration"],
+            "base.covariances": ["PoseCovariances"],
             "base.errors": [
                 "BentwingError",
                 "DivergedError",
@@ -120,6 +122,7 @@ __all__ = [
     "Payload",
     "PayloadError",
     "Pose",
+    "PoseCovariances",
     "Progress",
     "Recording",
     "RecordingError",

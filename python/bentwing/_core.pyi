@@ -470,6 +470,9 @@ class Registration:
         In rad and m, perturbed on the left in the map frame; zero where the past stays.
         """
 
+    def covariance_at(self, time: float) -> NDArray[np.float64]:
+        """Covariance (6, 6) of the correction at `time`, as of `sample_covariances`."""
+
     @property
     def offset(self) -> list[float]:
         """Correction (20,) that leads from the prior's mean to `globals`."""
@@ -587,6 +590,13 @@ class GlobalRegistration:
     @property
     def fit(self) -> tuple[float, float]:
         """Share of inliers and weighted root mean square of the final matches."""
+
+    @property
+    def dispersion(self) -> float:
+        """How much more the matches of two stretches scatter together than each for itself."""
+
+    def pose_covariances(self, piece: int, times: list[float]) -> NDArray[np.float64]:
+        """Covariances (K, 6, 6) of the corrections of a piece at `times`, rows taken as independent."""
 
     @property
     def counts(self) -> tuple[int, int, int, int]:

@@ -6,11 +6,12 @@ use std::sync::Arc;
 use bentwing_registration as core;
 use bentwing_registration::{GlobalPrior, GlobalProblem, Health, N_GLOBALS};
 use bentwing_surfels::SurfelSet;
-use numpy::{PyArray2, PyReadonlyArray2};
+use numpy::{PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, ToPyArray};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::arrays::to_array2;
-use crate::errors::{in_pool, solve_error};
+use crate::errors::{detached, in_pool, solve_error};
 use crate::registration::{RegistrationSettings, Surfels, global_matrix};
 use crate::trajectory::{Globals, Imu, Samples};
 
@@ -124,6 +125,31 @@ impl GlobalRegistration {
     #[getter]
     fn fit(&self) -> (f64, f64) {
         fit(&self.0.health)
+    }
+
+    /// How much more the matches of two stretches scatter together than each for itself.
+    #[getter]
+    fn dispersion(&self) -> f64 {
+        self.0.dispersion
+    }
+
+    /// Covariances (K, 6, 6) of the corrections of a piece at `times`, computed when asked for.
+    ///
+    /// Rotation first, rad and m, perturbed on the left in the map frame; rows count as independent.
+    fn pose_covariances<'py>(
+        &self,
+        py: Python<'py>,
+        piece: usize,
+        times: Vec<f64>,
+    ) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        if piece >= self.0.pieces.len() {
+            let n = self.0.pieces.len();
+            let message = format!("piece: expected less than {n}, got {piece}");
+            return Err(PyValueError::new_err(message));
+        }
+        let found = detached(py, || self.0.posterior.at(piece, &times));
+        let flat: Vec<f64> = found.iter().flat_map(|c| c.iter().copied()).collect();
+        flat.to_pyarray(py).reshape([found.len(), 6, 6])
     }
 
     /// Unknowns, pairs of stretches, those that do not follow each other, surfels.

@@ -338,6 +338,21 @@ impl Registration {
         flat.to_pyarray(py).reshape([found.len(), 6, 6])
     }
 
+    /// Covariance (6, 6) of the correction at `time`, computed when it is asked for; as of
+    /// `sample_covariances`.
+    fn covariance_at<'py>(
+        &self,
+        py: Python<'py>,
+        time: f64,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let found = detached(py, || self.0.posterior.at(time));
+        let rows: Vec<[f64; 6]> = found
+            .row_iter()
+            .map(|r| std::array::from_fn(|c| r[c]))
+            .collect();
+        to_array2(py, &rows)
+    }
+
     /// Correction (20,) that leads from the prior's mean to `globals`.
     #[getter]
     fn offset(&self) -> [f64; N_GLOBALS] {

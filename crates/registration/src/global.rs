@@ -8,10 +8,13 @@ mod gather;
 mod joint;
 mod link;
 mod overlap;
+mod posterior;
 mod problem;
+mod scatter;
 
 use gather::Gatherer;
 use joint::Joint;
+pub use posterior::GlobalPosterior;
 pub use problem::{Counts, GlobalProblem, GlobalRegistration, Iteration, Piece, PieceResult, Plan};
 
 use crate::state::{State, StepSize};
@@ -58,7 +61,7 @@ pub fn register_globally(
             break factorized;
         }
     };
-    let health = gatherer.health(&states, settings.cauchy_scale);
+    let (health, dispersion) = gatherer.judge(&states, settings.cauchy_scale);
     let counts = Counts {
         n_unknowns: joint.n_unknowns(&states),
         ..gatherer.counts()
@@ -69,12 +72,23 @@ pub fn register_globally(
         globals: state.globals,
         n_blind: state.n_blind,
     };
+    let splines = states.iter().enumerate();
+    let splines = splines
+        .map(|(piece, s)| (s.spline, joint.control(piece, 0)))
+        .collect();
+    let pieces = states.into_iter().enumerate().map(finish).collect();
     Ok(GlobalRegistration {
-        pieces: states.into_iter().enumerate().map(finish).collect(),
+        pieces,
         iterations,
         health,
+        dispersion,
         counts,
         converged: step_size.converged(settings),
+        posterior: GlobalPosterior {
+            factorized,
+            splines,
+            n_controls: joint.n_controls(),
+        },
     })
 }
 

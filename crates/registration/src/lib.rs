@@ -15,8 +15,8 @@ mod system;
 mod window;
 
 pub use global::{
-    Counts, GlobalProblem, GlobalRegistration, Iteration, Piece, PieceResult, Plan,
-    register_globally,
+    Counts, GlobalPosterior, GlobalProblem, GlobalRegistration, Iteration, Piece, PieceResult,
+    Plan, register_globally,
 };
 pub use globals::{GlobalMatrix, GlobalPrior, GlobalVector, Globals, N_GLOBALS, index};
 pub use health::Health;

@@ -11,6 +11,7 @@ from bentwing.base.value import Value
 if TYPE_CHECKING:
     from bentwing.base.breaks import Break
     from bentwing.base.calibration import Calibration
+    from bentwing.base.covariances import PoseCovariances
     from bentwing.base.trajectory import Trajectory
     from bentwing.base.window_record import WindowRecord
 
@@ -31,6 +32,7 @@ class Estimate(Value):
     breaks : where the recording breaks
     segments : first and last time of each stretch without a break, s; between them the trajectory
         is a guess
+    covariances : of the poses; None where the estimator has none
     """
 
     trajectory: Trajectory
@@ -42,6 +44,7 @@ class Estimate(Value):
     notes: list[str] = field(default_factory=list)
     breaks: list[Break] = field(default_factory=list)
     segments: list[tuple[float, float]] = field(default_factory=list)
+    covariances: PoseCovariances | None = None
 
     @property
     def warnings(self) -> list[str]:

@@ -12,6 +12,7 @@ from bentwing.base import geometry
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from bentwing.base.covariances import PoseCovariances
     from bentwing.base.trajectory import Trajectory
 
     Array = NDArray[np.float64]
@@ -71,26 +72,26 @@ def pose_errors_from(
     return np.hstack([turned, found - positions])
 
 
-def levelled_covariances(
-    covariances: NDArray[np.float64],
-    positions: NDArray[np.float64],
-    gravity_std: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    """Add to covariances (K, 6, 6) of poses what the doubt about the vertical makes of them.
+def normalized_pose_errors(
+    estimate: Trajectory,
+    covariances: PoseCovariances,
+    truth: Trajectory,
+    span: tuple[float, float],
+) -> Array:
+    """Return errors (K, 6) of poses in units of their standard deviations, two a second.
+
+    Estimate and truth agree in position and heading of the first pose, as the covariances mean it.
 
     Parameters
     ----------
-    positions : (K, 3) m, map frame
-    gravity_std : (2,) rad, of the turns about x and y that levelled the map
+    span : s, within both, of the poses that count
     """
-    levelled = covariances.copy()
-    for axis, std in enumerate(gravity_std):
-        direction = np.eye(3)[axis]
-        effect = np.hstack(
-            [np.tile(direction, (len(positions), 1)), np.cross(direction, positions)]
-        )
-        levelled += std**2 * effect[:, :, None] * effect[:, None, :]
-    return levelled
+    first = max(float(estimate.times[0]), float(truth.times[0]))
+    last = min(span[1], float(estimate.times[-1]), float(truth.times[-1]))
+    times = np.arange(max(span[0], first), last, 0.5)
+    errors = pose_errors_since(first, estimate, truth, times)
+    variances = np.einsum("kii->ki", covariances.at(times))
+    return np.asarray(errors / np.sqrt(variances))
 
 
 def nees(errors: NDArray[np.float64], covariances: NDArray[np.float64]) -> NDArray[np.float64]:

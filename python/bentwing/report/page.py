@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bentwing.base.atomic import write_text
+from bentwing.evaluate.expected import ExpectedAccuracy
 from bentwing.evaluate.map import wall_thickness
 from bentwing.report import sections
 from bentwing.report.calibration import calibration_table
@@ -151,9 +152,14 @@ def _accuracy(
     closing = closing_table(record.get("loop_closure"), asked=asked)
     loops = revisits_table(revisits, None if walls is None else walls.median)
     return (
-        f'<h2>Accuracy, from the map alone</h2><div class="grid"><div>{numbers}</div>'
+        f"<h2>Accuracy, without a reference</h2>{_expected(record.get('expected_accuracy'))}"
+        f'<div class="grid"><div>{numbers}</div>'
         f'<div>{closing}</div><div class="wide"><h3>Loops</h3>{loops}</div></div>'
     )
+
+
+def _expected(found: Mapping[str, float] | None) -> str:
+    return f"<p>{escape(ExpectedAccuracy(**found).sentence())}</p>" if found else ""
 
 
 def _motion(trajectory: Trajectory, spin: Spin | None) -> str:

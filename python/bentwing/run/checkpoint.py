@@ -17,6 +17,7 @@ import numpy as np
 from bentwing.base.atomic import write_bytes
 from bentwing.base.breaks import Break
 from bentwing.base.calibration import Calibration
+from bentwing.base.covariances import PoseCovariances
 from bentwing.base.errors import UsageError
 from bentwing.base.estimate import Estimate
 from bentwing.base.plain import plain
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
 
 NAME = "checkpoint.npz"
 _TRAJECTORY = ("times", "positions", "quats_xyzw")
+_COVARIANCES = ("covariance_times", "covariance_matrices")
 _OF_ESTIMATE = ("windows", "counts", "timings", "health", "notes", "breaks", "segments")
 _CORRECTIONS = ("localization", "loop_closure", "merging")
 # What must be the same for a run to go on; the number of threads changes no bit.
@@ -58,6 +60,12 @@ class Checkpoint:
         if estimate is None:
             return
         arrays = {name: getattr(estimate.trajectory, name) for name in _TRAJECTORY}
+        covariances = estimate.covariances
+        if covariances is not None:
+            arrays |= {
+                name: getattr(covariances, name.removeprefix("covariance_"))
+                for name in _COVARIANCES
+            }
         described = {
             "stage": stage,
             "asked": self._asked(),
@@ -101,7 +109,7 @@ class Checkpoint:
             return None, Found()
         try:
             with np.load(self._path, allow_pickle=False) as stored:
-                arrays = {name: stored[name] for name in (*_TRAJECTORY, "spin")}
+                arrays = {name: stored[name] for name in stored.files}
                 described = json.loads(str(stored["described"]))
         except FileNotFoundError:
             return None, Found()
@@ -147,6 +155,8 @@ def _found(arrays: dict[str, Any], described: dict[str, Any]) -> Found:
     fields["windows"] = [WindowRecord.from_json(window) for window in fields["windows"]]
     fields["breaks"] = [Break(**broken) for broken in fields["breaks"]]
     trajectory = Trajectory(*(arrays[name] for name in _TRAJECTORY))
+    known = _COVARIANCES[0] in arrays
+    fields["covariances"] = PoseCovariances(*(arrays[n] for n in _COVARIANCES)) if known else None
     return Found(
         Estimate(trajectory, Calibration.from_json(described["calibration"]), **fields),
         Reading(**described["reading"]),

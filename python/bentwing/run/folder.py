@@ -109,6 +109,14 @@ class RunFolder:
         poses = estimate.trajectory.within(estimate.segments)
         poses.write_tum(self.file(name), clock_origin_ns)
 
+    def write_covariances(self, name: str, estimate: Estimate, clock_origin_ns: int) -> None:
+        """Write the covariances of the poses; without any, no file of that name is a result."""
+        if estimate.covariances is not None:
+            estimate.covariances.write(self.file(name), clock_origin_ns)
+        elif name in self.record.files:
+            self.record.files.remove(name)
+            (self.path / name).unlink(missing_ok=True)
+
     def described(self) -> dict[str, Any]:
         """Return run.json as it stands, naming the files that are there."""
         record = self.record.to_json()

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from bentwing.calibrate.set_up import SetUp
     from bentwing.closing.georeference.georeference import Georeferenced
     from bentwing.closing.localize import GivenCoordinates
+    from bentwing.evaluate.expected import ExpectedAccuracy
     from bentwing.evaluate.revisits import Revisits
     from bentwing.evaluate.verdict import Evidence, Reason
     from bentwing.recording import Batch
@@ -97,6 +98,7 @@ class Found:
     localization, loop_closure, merging : what was done to correct the trajectory, for run.json
     placed : where the map is on the Earth, or in the coordinates of a prior map
     map : the map
+    accuracy : what to expect of trajectory and map
     runs : of a merged map, the runs in it, for run.json
     stage_warnings : sentences of the stages behind the estimate
     evidence : by which the result is judged
@@ -114,6 +116,7 @@ class Found:
     merging: Record | None = None
     placed: Placed | None = None
     map: WrittenMap | None = None
+    accuracy: ExpectedAccuracy | None = None
     runs: tuple[Record, ...] = ()
     stage_warnings: tuple[str, ...] = ()
     evidence: tuple[Evidence, ...] = ()
@@ -165,6 +168,7 @@ class Found:
             "calibration": None if estimate is None else estimate.calibration,
             "localization": localization,
             "loop_closure": self.loop_closure,
+            "expected_accuracy": self.accuracy,
             "georeference": None if self.placed is None else self.placed.record,
             "map": {} if written is None else written.record,
             "merging": self.merging,

@@ -17,7 +17,7 @@ from bentwing.run.choose import as_run_settings
 from bentwing.run.estimate import estimate
 from bentwing.run.folder import RunFolder
 from bentwing.run.report import report_failure, report_run, say_warnings
-from bentwing.run.run import Run
+from bentwing.run.run import COVARIANCES, Run
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -174,6 +174,7 @@ def _keep(job: stages.Job, found: Found, *, open_loop: bool = False) -> Found:
         raise found.failure
     if found.estimate is not None and found.estimate is not before.estimate:
         job.folder.write_trajectory("trajectory.txt", found.estimate, job.origin_ns)
+        job.folder.write_covariances(COVARIANCES, found.estimate, job.origin_ns)
     return found
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bentwing.base.calibration import Calibration
+from bentwing.base.covariances import PoseCovariances
 from bentwing.base.errors import InputError, UsageError
 from bentwing.base.estimate import Estimate
 from bentwing.base.run_record import read_record
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from bentwing.base.trajectory import Trajectory
     from bentwing.run.found import Found
 
+COVARIANCES = "trajectory_covariance.txt"
 _ROUNDED = 1e-6  # s; stamps in files are rounded to the nanosecond
 
 
@@ -50,6 +52,11 @@ class Run:
     def trajectory(self) -> Trajectory:
         """Poses of the IMU in the map."""
         return self.estimate.trajectory
+
+    @property
+    def covariances(self) -> PoseCovariances | None:
+        """Of the poses; None where the estimator has none."""
+        return self.estimate.covariances
 
     @classmethod
     def of(cls, out: Path, found: Found) -> Run:
@@ -124,4 +131,9 @@ def estimate_of(folder: Path, record: Mapping[str, Any]) -> Estimate:
         Calibration.from_json(record["calibration"]),
         windows=[WindowRecord.from_json(window) for window in record.get("windows") or []],
         segments=[(float(part.times[0]), float(part.times[-1])) for part in segments],
+        covariances=_covariances_of(folder / COVARIANCES, int(record["start_ns"])),
     )
+
+
+def _covariances_of(path: Path, start_ns: int) -> PoseCovariances | None:
+    return PoseCovariances.read(path, start_ns) if path.exists() else None

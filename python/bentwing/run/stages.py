@@ -13,6 +13,7 @@ from bentwing.closing.georeference.georeference import georeference
 from bentwing.closing.global_registration import Budget, close_loops
 from bentwing.closing.joining.segments import close_segments
 from bentwing.closing.localize import Difference, NotInMapError, find_in_map
+from bentwing.evaluate.expected import expected_accuracy
 from bentwing.evaluate.verdict import judge_closing, judge_revisits
 from bentwing.map.project import project
 from bentwing.run.mapping import MapSource, write_map
@@ -132,7 +133,8 @@ def place_on_earth(job: Job, found: Found) -> Found:
     if placed is None:
         return found
     if placed.trajectory is not estimate.trajectory:
-        estimate = replace(estimate, trajectory=placed.trajectory)
+        # Bent by fixes, it is no longer what the covariances are of.
+        estimate = replace(estimate, trajectory=placed.trajectory, covariances=None)
     warnings = (*found.stage_warnings, *placed.warnings)
     return replace(found, estimate=estimate, placed=placed, stage_warnings=warnings)
 
@@ -154,8 +156,12 @@ def make_map(job: Job, found: Found) -> Found:
             placed=found.placed,
             difference=difference,
         )
-    evidence = judge_revisits(written.revisits, part.payload.lidar.range_sigma)
-    return replace(found, map=written, evidence=(*found.evidence, *evidence))
+    sigma = part.payload.lidar.range_sigma
+    evidence = judge_revisits(written.revisits, sigma)
+    accuracy = expected_accuracy(estimate.trajectory, estimate.covariances, sigma)
+    return replace(
+        found, map=written, accuracy=accuracy, evidence=(*found.evidence, *evidence)
+    )
 
 
 def _known(found: Found) -> Estimate:

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from bentwing.base import geometry
+from bentwing.base.covariances import levelled_covariances
 from bentwing.base.trajectory import Trajectory
 from bentwing.evaluate.nees import (
-    levelled_covariances,
     nees,
     nees_bounds,
     pose_errors_from,

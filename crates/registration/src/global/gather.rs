@@ -11,6 +11,7 @@ use super::joint::Joint;
 use super::link::{Link, LinkEquations, LinkMatch, LinkSum};
 use super::overlap::{follow, links};
 use super::problem::{Counts, GlobalProblem};
+use super::scatter::Scatter;
 use crate::state::State;
 use crate::{Health, NormalEquations, Settings};
 
@@ -91,11 +92,15 @@ impl Gatherer {
         (health, n_far)
     }
 
-    /// How the matches fit.
-    pub fn health(&mut self, states: &[State<'_>], scale: f64) -> Health {
-        let (joint, mut health) = (Joint::new(states), Health::default());
-        self.each(states, &joint, scale, |_, part| health.merge(&part.health));
-        health
+    /// How the matches fit, and how much more they scatter together than each for itself.
+    pub fn judge(&mut self, states: &[State<'_>], scale: f64) -> (Health, f64) {
+        let joint = Joint::new(states);
+        let (mut health, mut scatter) = (Health::default(), Scatter::new(joint.n_controls()));
+        self.each(states, &joint, scale, |_, part| {
+            health.merge(&part.health);
+            scatter.add(&part.equations, &part.controls);
+        });
+        (health, scatter.dispersion())
     }
 
     fn each(

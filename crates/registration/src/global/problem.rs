@@ -6,6 +6,7 @@ use std::sync::Arc;
 use bentwing_surfels::SurfelSet;
 use bentwing_trajectory::{Imu, Trajectory};
 
+use super::posterior::GlobalPosterior;
 use crate::constraints::initial;
 use crate::state::State;
 use crate::{GlobalMatrix, GlobalPrior, Globals, Health, Settings, StepSize};
@@ -112,8 +113,12 @@ pub struct GlobalRegistration {
     pub iterations: Vec<Iteration>,
     /// Matches of the final trajectories.
     pub health: Health,
+    /// How much more the matches of two stretches scatter together than each for itself.
+    pub dispersion: f64,
     /// How much there was to do.
     pub counts: Counts,
     /// Whether the last step was below the thresholds.
     pub converged: bool,
+    /// The last equations.
+    pub posterior: GlobalPosterior,
 }

@@ -30,6 +30,11 @@ impl Posterior {
         groups.flat_map(|group| self.of_group(group)).collect()
     }
 
+    /// Of the correction at one time.
+    pub fn at(&self, time: f64) -> Matrix6<f64> {
+        self.of_group(&[self.spline.basis(time)])[0]
+    }
+
     /// Of samples in the order of their control points.
     fn of_group(&self, bases: &[Basis]) -> Vec<Matrix6<f64>> {
         let (first, last) = (bases[0].first, bases[bases.len() - 1].first);

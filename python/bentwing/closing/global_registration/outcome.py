@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bentwing.base import geometry
+from bentwing.base.covariances import PoseCovariances
 from bentwing.base.trajectory import Trajectory
 from bentwing.closing.global_registration.stretches import interval_of
+from bentwing.odometry.continuous.drift import USUAL_DISPERSION, with_heading
 from bentwing.odometry.continuous.slow_states import named_std
 from bentwing.odometry.core_states import refined_mount
 from bentwing.odometry.segments import joined
@@ -21,6 +23,9 @@ if TYPE_CHECKING:
     from bentwing import _core
     from bentwing.base.estimate import Estimate
 
+# Covariances are computed so often, s, but no more than so many: the cost grows with each.
+POSE_INTERVAL = 0.5
+MOST_POSES = 100
 # So much smaller may the share of inliers become by chance.
 TOLERATED_LOSS = 0.01
 
@@ -74,7 +79,39 @@ def closed_estimate(
         accel_bias=slow.accel_bias,
         std={**estimate.calibration.std, **named_std(covariance, frozen)},
     )
-    return replace(estimate, trajectory=joined(moved, dt), calibration=calibration)
+    return replace(
+        estimate,
+        trajectory=joined(moved, dt),
+        calibration=calibration,
+        covariances=_covariances(found, moved, own, _inertial_inflation(estimate)),
+    )
+
+
+def _covariances(
+    found: _core.GlobalRegistration,
+    segments: Sequence[Trajectory],
+    own: slice,
+    inflation: float,
+) -> PoseCovariances | None:
+    """Return those of poses evenly along the segments, as uncertain as residuals say they are."""
+    inflation = max(inflation, found.dispersion / USUAL_DISPERSION)
+    seconds = sum(float(s.times[-1] - s.times[0]) for s in segments)
+    interval = max(POSE_INTERVAL, seconds / MOST_POSES)
+    parts = []
+    for piece, segment in enumerate(segments, start=own.start):
+        first, last = float(segment.times[0]), float(segment.times[-1])
+        times = np.linspace(first, last, 1 + max(1, round((last - first) / interval)))
+        parts.append(
+            PoseCovariances(times, with_heading(found.pose_covariances(piece, times.tolist())))
+        )
+    return PoseCovariances.joined([p.scaled(inflation) for p in parts])
+
+
+def _inertial_inflation(estimate: Estimate) -> float:
+    """How much larger than stated the noise of the IMU is, by the windows' residuals; at least one."""
+    rms = [[r for r in (w.gyro_rms, w.accel_rms) if r is not None] for w in estimate.windows]
+    worst = [max(r) ** 2 for r in rms if r]
+    return max(1.0, float(np.median(worst))) if worst else 1.0
 
 
 def record_of(

@@ -13,6 +13,7 @@ from bentwing import _core
 from bentwing.base import geometry
 from bentwing.base.trajectory import DT, Trajectory
 from bentwing.base.window_record import WindowRecord
+from bentwing.odometry.continuous.drift import Drift
 from bentwing.odometry.continuous.final_poses import FinalPoses
 from bentwing.odometry.continuous.slow_states import SlowStatePrior, named_std
 from bentwing.odometry.continuous.views import FixedViews
@@ -21,6 +22,7 @@ from bentwing.odometry.start import levelling
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from bentwing.base.covariances import PoseCovariances
     from bentwing.odometry.buffer import BatchBuffer, LidarStretch
     from bentwing.odometry.continuous.core_settings import CoreSettings
     from bentwing.odometry.continuous.settings import ContinuousSettings
@@ -73,6 +75,7 @@ class OdometryPass:
         self._views = FixedViews(settings)
         self._finished: list[FinalPoses] = []
         self._end = samples.end
+        self._drift = Drift()
         self.covariance = np.zeros((20, 20))
         self.timings = {"propagate": 0.0, "surfels": 0.0, "register": 0.0}
         self._finish()  # a rest may have been long
@@ -122,6 +125,10 @@ class OdometryPass:
         positions, quats = zip(*parts, strict=True)
         return self._levelled(self._origin, np.concatenate(positions), np.concatenate(quats))
 
+    def covariances(self, trajectory: Trajectory) -> PoseCovariances:
+        """Return those of some poses of what `trajectory` has returned."""
+        return self._drift.covariances(trajectory, self._first_position)
+
     def recent(self) -> Trajectory:
         """Return the end of the trajectory, levelled."""
         samples = self.samples
@@ -165,6 +172,7 @@ class OdometryPass:
         frozen._surfels = [*self._surfels]
         frozen._views = copy(self._views)
         frozen._finished = [*self._finished]
+        frozen._drift = deepcopy(self._drift)
         return frozen
 
     def _imu(self, buffer: BatchBuffer, end: float) -> _core.Imu | None:
@@ -210,6 +218,8 @@ class OdometryPass:
         self.samples = self.samples.following(moved).replaced(first, result.samples)
         self.globals = result.globals
         self.covariance = self.prior.discounted(result.covariance)
+        leaving = self._window_start(self._end + self.settings.shift)
+        self._drift.add(result, start, leaving, self._end)
         length = self._end - start
         self.prior.carry(result.covariance, result.offset, min(new, length), length)
         self.windows.append(self._record(result))

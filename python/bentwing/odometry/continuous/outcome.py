@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bentwing.base.calibration import STANDARD_GRAVITY
+from bentwing.base.covariances import PoseCovariances
 from bentwing.base.estimate import Estimate
 from bentwing.base.trajectory import DT
 from bentwing.odometry.continuous.odometry_pass import MARGIN
@@ -71,6 +72,9 @@ def estimate_of(
         notes=_notes(windows, first_turn),
         breaks=[*breaks],
         segments=[(float(s.times[0]), float(s.times[-1])) for s in segments],
+        covariances=PoseCovariances.joined(
+            [p.covariances(s) for p, s in zip(passes, segments, strict=True)]
+        ),
     )
 
 

@@ -16,7 +16,7 @@ from bentwing.base.window_record import WindowRecord
 from bentwing.odometry.health import is_degenerate
 from bentwing.odometry.kalman.core import SLOW, anchored, unlearned_delay
 from bentwing.odometry.kalman.learned import calibration_of
-from bentwing.odometry.kalman.snapshot import FilterSnapshot, joined_poses
+from bentwing.odometry.kalman.snapshot import N_RECENT, FilterSnapshot, joined_poses
 from bentwing.odometry.segments import extrapolated, heading
 from bentwing.odometry.start import levelling
 
@@ -121,6 +121,7 @@ class FilterPass:
             calibration_of(self.filter, self.motor_rate, self.described),
             [*self.windows],
             [*self._poses],
+            self._covariances[::N_RECENT],
             self.blind,
             self.seconds,
             is_settling,

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from bentwing.base.covariances import PoseCovariances
 from bentwing.base.estimate import Estimate
 from bentwing.base.spans import name_spans, spans_of
 from bentwing.odometry.health import FEW, drift, unseen_sentence
@@ -49,6 +50,9 @@ def estimate_of(
         health=_health(windows, blind),
         breaks=[*breaks],
         segments=[(float(p.times[0]), float(p.times[-1])) for p in parts],
+        covariances=PoseCovariances.joined(
+            [p.covariances(t) for p, t in zip((p for p in passes if p.windows), parts, strict=True)]
+        ),
     )
 
 

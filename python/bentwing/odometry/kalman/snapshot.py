@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bentwing.base.covariances import PoseCovariances
 from bentwing.base.trajectory import Trajectory
 from bentwing.odometry.level_snapshot import LevelSnapshot
 from bentwing.odometry.segments import turned
@@ -36,6 +37,7 @@ class FilterSnapshot(LevelSnapshot):
     calibration : the slow states
     windows : records of the sweeps
     poses : of the sweeps, not levelled
+    doubts : times, s, and covariances (6, 6) of the poses after some sweeps, not levelled
     blind, seconds : without inertial samples, and of work
     is_settling : whether it is a rehearsal
     """
@@ -45,6 +47,7 @@ class FilterSnapshot(LevelSnapshot):
     calibration: Calibration
     windows: list[WindowRecord]
     poses: list[Poses]
+    doubts: list[tuple[float, NDArray[np.float64]]]
     blind: float
     seconds: float
     is_settling: bool
@@ -56,6 +59,15 @@ class FilterSnapshot(LevelSnapshot):
     def recent(self) -> Trajectory:
         """Return the poses of the last second."""
         return self._levelled(self.poses[-N_RECENT:])
+
+    def covariances(self, trajectory: Trajectory) -> PoseCovariances:
+        """Return those of some poses of what `trajectory` has returned."""
+        known = [(t, c) for t, c in self.doubts if trajectory.covers(np.array([t]))[0]]
+        times = np.array([t for t, _ in known])
+        matrices = np.array([c for _, c in known]).reshape(-1, 6, 6)
+        away = trajectory.interpolate(times)[0]
+        gravity = np.array(self.calibration.std.get("gravity", [0.0, 0.0]))
+        return PoseCovariances(times, matrices).levelled(away, gravity)
 
     def _levelled(self, parts: list[Poses]) -> Trajectory:
         return turned(joined_poses(parts), levelling(self.gravity))

@@ -12,6 +12,7 @@ from bentwing.simulate.names import (
     EventName,
     FlightName,
     HeadName,
+    RealismGroup,
     ReceiverName,
     RecordingFormat,
     SceneName,
@@ -20,10 +21,12 @@ from bentwing.simulate.names import (
 
 if TYPE_CHECKING:
     from enum import Enum as Event
+    from enum import Enum as Group
 
     from bentwing.simulate import Scenario
 else:
     Event = enumeration("Event", get_args(EventName))
+    Group = enumeration("Group", get_args(RealismGroup))
 
 
 EXAMPLES = (
@@ -31,6 +34,7 @@ EXAMPLES = (
     "bentwing simulate office --head vlp16-motor --flight stand -o stand",
     "bentwing simulate town --gnss rtk --format mcap -o town",
     "bentwing simulate office --event spin-stall --stall 10 -o stall",
+    "bentwing simulate courtyard --realism 3 --realism-only stamps -o late",
 )
 
 WORLD = "World and flight"
@@ -111,6 +115,24 @@ def command(
     calibrated: Annotated[
         bool, option(TROUBLE, "--calibrated", help="The payload is exact, the clocks agree.")
     ] = False,
+    realism: Annotated[
+        float,
+        option(
+            TROUBLE,
+            metavar="0|1|3",
+            help="What real sensors do beyond noise: 0 nothing, 1 as usual, 3 three times that.",
+        ),
+    ] = 0.0,
+    realism_only: Annotated[
+        list[Group],
+        option(
+            TROUBLE,
+            "--realism-only",
+            metavar="GROUP",
+            help=f"Only this group of it, repeatable: {', '.join(get_args(RealismGroup))}.",
+            show_default=False,
+        ),
+    ] = [],  # noqa: B006 - typer reads it and hands out a copy
     bag_format: Annotated[
         RecordingFormat,
         option(
@@ -138,6 +160,8 @@ def command(
         "flight": flight,
         "gnss": gnss,
         "calibrated": calibrated,
+        "realism": realism,
+        "realism_only": [one.value for one in realism_only],
     }
     _run(_scenario(choices), out, quiet=quiet)
 

@@ -13,6 +13,9 @@ HeadName: TypeAlias = Literal[
     "hokuyo-spin", "hokuyo-nod", "vlp16-fixed", "vlp16-side", "vlp16-motor"
 ]
 SpinName: TypeAlias = Literal["steady", "plant"]
+RealismGroup: TypeAlias = Literal[
+    "stamps", "ranges", "imu", "mount", "motor", "shocks", "scene", "payload"
+]
 FlightName: TypeAlias = Literal["tour", "survey", "stand"]
 RecordingFormat: TypeAlias = Literal["bag", "mcap", "db3"]
 ReceiverName: TypeAlias = Literal["rtk", "single"]

@@ -15,6 +15,7 @@ from bentwing.simulate.names import (  # noqa: TC001 - pydantic reads the annota
     EventName,
     FlightName,
     HeadName,
+    RealismGroup,
     ReceiverName,
     RecordingFormat,
     SceneName,
@@ -47,6 +48,9 @@ class Scenario(Settings):
     gnss : a receiver, `rtk` or `single`; by default there is none
     flight : a tour from the ground and back, the site's line in the air (town, walls, dam), or none:
         the head on a stand
+    realism : size of the errors that real sensors have beyond noise: 0 for none, 1 for what is
+        usual, 3 for three times that
+    realism_only : groups of these errors; by default all
     calibrated : whether the payload has the head as it is, and the clocks agree
     noiseless : without random errors of the sensors (calibration and clock stay wrong)
     """
@@ -65,6 +69,8 @@ class Scenario(Settings):
     stall: float = Field(default=STALL, gt=0.0, le=60.0)
     gnss: ReceiverName | None = None
     flight: FlightName = "tour"
+    realism: float = Field(default=0.0, ge=0.0, le=3.0)
+    realism_only: tuple[RealismGroup, ...] = ()
     calibrated: bool = False
     noiseless: bool = False
 
@@ -102,7 +108,16 @@ class Scenario(Settings):
         """Errors of a lidar with range noise `sigma` (m)."""
         if self.noiseless:
             return RangeErrors(0.0, resolution=0.0, dropout=0.0, mixing=0.0)
-        return RangeErrors(sigma)
+        # Beams that have a width need no mixing by chance.
+        return RangeErrors(sigma, mixing=0.0) if self.realism_of("ranges") else RangeErrors(sigma)
+
+    def realism_of(self, group: RealismGroup) -> float:
+        """Return the size of one group of real sensors' errors."""
+        return self.realism if not self.realism_only or group in self.realism_only else 0.0
+
+    def doubt(self) -> float:
+        """Return how wrong the payload is, against the usual."""
+        return 0.0 if self.calibrated else max(1.0, self.realism_of("payload"))
 
     def rng(self, purpose: str) -> np.random.Generator:
         """Random numbers that depend on the seed and on what they are for."""

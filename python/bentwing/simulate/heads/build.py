@@ -40,15 +40,15 @@ def build_rig(scenario: Scenario, world: World, duration: float) -> Rig:
     if scenario.head == "hokuyo-spin":
         return Rig(flight, _spun(scenario, flight, rng, duration))
     max_range = scenario.max_range or VLP16_RANGE
-    exact = scenario.calibrated
+    doubt = scenario.doubt()
     if scenario.head == "vlp16-fixed":
-        return Rig(flight, vlp16_fixed(rng, max_range, exact=exact))
+        return Rig(flight, vlp16_fixed(rng, max_range, doubt))
     if scenario.head == "vlp16-side":
-        return Rig(flight, vlp16_side(rng, max_range, exact=exact))
+        return Rig(flight, vlp16_side(rng, max_range, doubt))
     drive = _drive(scenario, MOTOR_STEP, duration)
     if "motor-reversal" in scenario.events:
         drive = drive * reversing(knot_times(MOTOR_STEP, duration), duration)
-    return Rig(flight, vlp16_motor(rng, scenario.motor_rate, drive, max_range, exact=exact))
+    return Rig(flight, vlp16_motor(rng, scenario.motor_rate, drive, max_range, doubt))
 
 
 def _flight(scenario: Scenario, world: World, duration: float) -> Flight:
@@ -70,14 +70,15 @@ def _spun(scenario: Scenario, flight: Flight, rng: np.random.Generator, duration
         spin = driven_spin(air, mean, scenario.rng("spin"), turning)
     else:
         spin = spin_angle(rng, mean, drive * turning)
-    return hokuyo_spin(rng, spin, scenario.max_range or HOKUYO_RANGE)
+    return hokuyo_spin(rng, spin, scenario.max_range or HOKUYO_RANGE, scenario.doubt())
 
 
 def _nodding(scenario: Scenario, world: World, rng: np.random.Generator, duration: float) -> Rig:
     carrier = walk(world, scenario.rng("walk"), duration)
     walking = carrier.walking(knot_times(NOD_STEP, duration))
     drive = walking * _drive(scenario, NOD_STEP, duration)
-    return Rig(carrier, hokuyo_nod(rng, drive, scenario.max_range or HOKUYO_RANGE))
+    max_range = scenario.max_range or HOKUYO_RANGE
+    return Rig(carrier, hokuyo_nod(rng, drive, max_range, scenario.doubt()))
 
 
 def _drive(scenario: Scenario, step: float, duration: float) -> Array:

@@ -36,6 +36,8 @@ class Vlp16:
     max_range: float = 100.0
     topic: str = "/points"
     noise: float = 0.02
+    rings: tuple[int, ...] = tuple(ORDER)
+    beam_sigma: float = float(np.radians(0.05))
 
     def beams(self, start: float, end: float) -> Beams | None:
         """Revolutions that begin in [start, end)."""

@@ -70,12 +70,17 @@ def command(
     ] = None,
     flight: Annotated[
         FlightName | None,
-        option(WORLD, help="Kind of flight.", show_default="tour; walls, dam: survey"),
+        option(
+            WORLD, help="Kind of flight.", show_default="tour; walls, dam: survey; street: drive"
+        ),
     ] = None,
     speed: Annotated[
         float | None,
         option(
-            WORLD, metavar="M/S", help="Approximate speed of a tour.", show_default="the scene's"
+            WORLD,
+            metavar="M/S",
+            help="Approximate speed of a tour or drive.",
+            show_default="the scene's",
         ),
     ] = None,
     head: Annotated[
@@ -83,7 +88,7 @@ def command(
         option(
             HEAD,
             help="Sensor head, and how it is moved.",
-            show_default="hokuyo-spin; town, walls, dam: vlp16-motor",
+            show_default="hokuyo-spin; town, walls, dam: vlp16-motor; street: hdl64",
         ),
     ] = None,
     motor_rate: Annotated[float, option(HEAD, metavar="RAD/S", help="Rate of vlp16-motor.")] = 1.0,

@@ -14,7 +14,7 @@ import numpy as np
 from bentwing.simulate.heads.airframe import quadrotor
 from bentwing.simulate.heads.joints import Joint, Mount, Turn
 from bentwing.simulate.lidars.interface import described_lidar
-from bentwing.simulate.lidars.vlp16 import Vlp16
+from bentwing.simulate.lidars.vlp16 import vlp16
 from bentwing.simulate.rig import Encoder, Head
 from bentwing.simulate.splines import Spline
 
@@ -48,7 +48,7 @@ def vlp16_side(rng: np.random.Generator, max_range: float, doubt: float = 1.0) -
 
 
 def _fixed(rng: np.random.Generator, nominal: Mount, max_range: float, doubt: float) -> Head:
-    lidar = Vlp16(max_range=max_range)
+    lidar = vlp16(max_range)
     true = _true(nominal, rng, doubt, np.radians(0.5), 0.004)
     payload = {
         "lidar": described_lidar(lidar, "vlp16", min_range=0.5),
@@ -63,7 +63,7 @@ def vlp16_motor(
     rng: np.random.Generator, rate: float, drive: Array, max_range: float, doubt: float = 1.0
 ) -> Head:
     """Build the lidar on a motor that turns at `rate` rad/s times `drive` (at the knots of `MOTOR_STEP`)."""
-    lidar = Vlp16(max_range=max_range)
+    lidar = vlp16(max_range)
     motor = Mount(np.eye(3), np.array([0.0, 0.0, -0.10]))
     nominal = Mount(ON_ITS_SIDE, np.array([0.0, 0.0, -0.07]))
     # What is unknown of T_imu_lidar sits before the motor, the misalignment behind it.

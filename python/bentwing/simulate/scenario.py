@@ -92,6 +92,13 @@ class Scenario(Settings):
         return {**values, **{k: v for k, v in chosen.items() if values.get(k) is None}}
 
     @model_validator(mode="after")
+    def _groups_have_a_size(self) -> Scenario:
+        if self.realism_only and not self.realism:
+            msg = "realism_only chooses groups of errors that have no size: give realism as well"
+            raise ValueError(msg)
+        return self
+
+    @model_validator(mode="after")
     def _can_be_driven(self) -> Scenario:
         asked = [self.scene in _DRIVEN, self.flight == "drive", self.head in CAR_HEADS]
         if any(asked) and not all(asked):

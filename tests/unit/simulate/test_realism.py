@@ -16,7 +16,6 @@ from bentwing.simulate.names import RealismGroup
 from bentwing.simulate.ranging import Shots, Surfaces
 from bentwing.simulate.realism.beams import draw_beams
 from bentwing.simulate.realism.divergence import reported
-from bentwing.simulate.realism.draw import Realism
 from bentwing.simulate.realism.effect import about
 from bentwing.simulate.realism.glass import FRONT, draw_glass
 from bentwing.simulate.realism.inertial import WARMING, InertialResponse, draw_response
@@ -404,7 +403,7 @@ def test_draws_grow_with_the_level():
 
 
 def test_ideal_sensors_draw_nothing_and_leave_no_file(tmp_path):
-    scenario = Scenario(scene="office", head="hokuyo-nod", duration=11.0, realism_only=("stamps",))
+    scenario = Scenario(scene="office", head="hokuyo-nod", duration=11.0)
     files = simulate(scenario, tmp_path / "out")
     assert sorted(path.name for path in files.recording.parent.glob("truth*")) == [
         "truth_calibration.yaml",
@@ -443,6 +442,11 @@ def test_every_draw_stands_beside_the_truth_and_the_best_map_lies_on_the_scene(t
     assert 1e-3 < abs(true["latency"]) < 1.5e-2
 
 
+def test_groups_without_a_size_are_refused():
+    with pytest.raises(ValidationError, match="give realism as well"):
+        Scenario(scene="office", realism_only=("stamps",))
+
+
 def test_levels_beyond_three_and_unknown_groups_are_refused():
     with pytest.raises(ValidationError, match="realism"):
         Scenario(scene="office", realism=4.0)
@@ -460,9 +464,14 @@ def test_a_cast_without_effects_is_that_of_the_scene():
     assert cosines[0] == 1.0
 
 
-def test_realism_needs_no_more_than_a_scenario():
-    realism = Realism(Scenario(scene="office"), 60.0)
-    assert realism.response() is None
-    assert realism.host() is None
-    assert realism.shocks() is None
-    assert realism.ranges(None) == []
+@pytest.mark.parametrize("head", ["hokuyo-spin", "vlp16-motor"])
+def test_ideal_sensors_are_as_they_were_without_effects(head):
+    _, setup = drawn(head=head)
+    sensors, ranger = setup.sensors, setup.sensors.ranger
+    assert (sensors.host, sensors.samples, sensors.imu.response, sensors.imu.shocks) == (None,) * 4
+    assert (ranger.aim, list(ranger.effects)) == (None, [])
+    assert isinstance(ranger.bodies[0], Surfaces)
+    assert ranger.bodies[0].scene is setup.world.scene
+    assert ranger.errors.mixing > 0.0
+    assert not isinstance(setup.rig.head.encoder, AskewEncoder)
+    assert len(setup.rig.head.to_lidar) == (3 if head == "vlp16-motor" else 1)

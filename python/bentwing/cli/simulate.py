@@ -13,6 +13,7 @@ from bentwing.simulate.names import (
     FaultName,
     FlightName,
     HeadName,
+    RealismGroup,
     ReceiverName,
     RecordingFormat,
     SceneName,
@@ -22,11 +23,13 @@ from bentwing.simulate.names import (
 if TYPE_CHECKING:
     from enum import Enum as Event
     from enum import Enum as Fault
+    from enum import Enum as Group
 
     from bentwing.simulate import Scenario
 else:
     Event = enumeration("Event", get_args(EventName))
     Fault = enumeration("Fault", get_args(FaultName))
+    Group = enumeration("Group", get_args(RealismGroup))
 
 
 EXAMPLES = (
@@ -35,6 +38,7 @@ EXAMPLES = (
     "bentwing simulate town --gnss rtk --format mcap -o town",
     "bentwing simulate office --event spin-stall --stall 10 -o stall",
     "bentwing simulate office --fault gyro-degrees -o degrees",
+    "bentwing simulate courtyard --realism 3 --realism-only stamps -o late",
 )
 
 WORLD = "World and flight"
@@ -70,12 +74,17 @@ def command(
     ] = None,
     flight: Annotated[
         FlightName | None,
-        option(WORLD, help="Kind of flight.", show_default="tour; walls, dam: survey"),
+        option(
+            WORLD, help="Kind of flight.", show_default="tour; walls, dam: survey; street: drive"
+        ),
     ] = None,
     speed: Annotated[
         float | None,
         option(
-            WORLD, metavar="M/S", help="Approximate speed of a tour.", show_default="the scene's"
+            WORLD,
+            metavar="M/S",
+            help="Approximate speed of a tour or drive.",
+            show_default="the scene's",
         ),
     ] = None,
     head: Annotated[
@@ -83,7 +92,7 @@ def command(
         option(
             HEAD,
             help="Sensor head, and how it is moved.",
-            show_default="hokuyo-spin; town, walls, dam: vlp16-motor",
+            show_default="hokuyo-spin; town, walls, dam: vlp16-motor; street: hdl64",
         ),
     ] = None,
     motor_rate: Annotated[float, option(HEAD, metavar="RAD/S", help="Rate of vlp16-motor.")] = 1.0,
@@ -124,6 +133,24 @@ def command(
     calibrated: Annotated[
         bool, option(TROUBLE, "--calibrated", help="The payload is exact, the clocks agree.")
     ] = False,
+    realism: Annotated[
+        float,
+        option(
+            TROUBLE,
+            metavar="0|1|3",
+            help="What real sensors do beyond noise: 0 nothing, 1 as usual, 3 three times that.",
+        ),
+    ] = 0.0,
+    realism_only: Annotated[
+        list[Group],
+        option(
+            TROUBLE,
+            "--realism-only",
+            metavar="GROUP",
+            help=f"Only this group of it, repeatable: {', '.join(get_args(RealismGroup))}.",
+            show_default=False,
+        ),
+    ] = [],  # noqa: B006 - typer reads it and hands out a copy
     bag_format: Annotated[
         RecordingFormat,
         option(
@@ -151,6 +178,8 @@ def command(
         "flight": flight,
         "gnss": gnss,
         "calibrated": calibrated,
+        "realism": realism,
+        "realism_only": [one.value for one in realism_only],
     }
     _run(_scenario(choices), None if fault is None else fault.value, out, quiet=quiet)
 

@@ -15,6 +15,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from bentwing.simulate.realism.inertial import InertialResponse
+    from bentwing.simulate.realism.shocks import Shocks
+
     Array = NDArray[np.float64]
 
 GRAVITY = np.array([0.0, 0.0, 9.80665])
@@ -79,12 +82,16 @@ class Imu:
     Attributes
     ----------
     activity : how hard the rotors work (0 … 1) at given times
-    biases : (6,) current gyro and accelerometer bias
+    response : how it answers to rates and forces, if not perfectly
+    shocks : what shakes it beyond what it can follow
+    biases : (6,) current gyro and accelerometer bias, as they are at the start's temperature
     """
 
     errors: ImuErrors
     rng: np.random.Generator
     activity: Callable[[Array], Array]
+    response: InertialResponse | None = None
+    shocks: Shocks | None = None
     biases: Array = field(init=False)
     _phase: float = field(init=False)
     _directions: tuple[Array, Array] = field(init=False)
@@ -101,8 +108,18 @@ class Imu:
     def sample(self, times: Array, motion: Motion) -> tuple[Array, Array]:
         """Gyro and accelerometer (M, 3) at `times`, given the IMU frame's true motion."""
         ideal = np.hstack([motion.omega, specific_force(motion)])
+        if self.response is not None:
+            ideal = self.response.felt(times, ideal)
         measured = ideal + self._walk(len(times)) + self._noise(len(times)) + self._vibrate(times)
+        if self.shocks is not None:
+            measured = self.shocks.felt(times, measured, self.activity(times))
         return measured[:, :3], measured[:, 3:]
+
+    def biases_at(self, time: float) -> Array:
+        """Return the current biases (6,), with what the temperature has changed until `time`, s."""
+        if self.response is None:
+            return self.biases.copy()
+        return np.asarray(self.biases + self.response.drifted(np.array([time]))[0])
 
     def _walk(self, n: int) -> Array:
         e = self.errors

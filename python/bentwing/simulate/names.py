@@ -7,13 +7,18 @@ from typing import Literal, TypeAlias
 
 SceneName: TypeAlias = Literal[
     "courtyard", "compound", "office", "forest", "cave", "mine", "town", "walls", "dam",
-    "mocap", "carpark", "campus",
+    "mocap", "carpark", "campus", "street",
 ]  # fmt: skip
 HeadName: TypeAlias = Literal[
-    "hokuyo-spin", "hokuyo-nod", "vlp16-fixed", "vlp16-side", "vlp16-motor"
+    "hokuyo-spin", "hokuyo-nod", "vlp16-fixed", "vlp16-side", "vlp16-motor", "hdl64", "os1-64"
 ]
+CAR_HEADS = ("hdl64", "os1-64")
+"""Heads on the roof of a car, which drives on a road."""
 SpinName: TypeAlias = Literal["steady", "plant"]
-FlightName: TypeAlias = Literal["tour", "survey", "stand"]
+RealismGroup: TypeAlias = Literal[
+    "stamps", "ranges", "imu", "mount", "motor", "shocks", "scene", "payload"
+]
+FlightName: TypeAlias = Literal["tour", "survey", "stand", "drive"]
 RecordingFormat: TypeAlias = Literal["bag", "mcap", "db3"]
 ReceiverName: TypeAlias = Literal["rtk", "single"]
 EventName: TypeAlias = Literal[

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from bentwing.simulate.beams import Beams
     from bentwing.simulate.kinematics import Motion
     from bentwing.simulate.rig import Rig
-    from bentwing.simulate.scenes import World
     from bentwing.simulate.scenes.mesh import Mesh
 
     Array = NDArray[np.float64]
@@ -52,12 +51,33 @@ class RangeErrors:
     edge: float = 0.3
 
 
-class Mover(Protocol):
-    """A body that moves in the map or with the lidar."""
+class Body(Protocol):
+    """What can be hit: the world, or a body that moves in it or with the lidar."""
 
     def cast(self, beams: Beams, origins: Array, directions: Array) -> tuple[Array, Array]:
         """Ranges (N,) and cosines of incidence (N,) of the beams on this body."""
         ...
+
+
+@dataclass(frozen=True, slots=True)
+class Surfaces:
+    """Surfaces that stand still.
+
+    Attributes
+    ----------
+    normals : (T, 3) unit normals of the triangles
+    max_range : m, beyond it nothing returns
+    """
+
+    scene: Scene
+    normals: Array
+    max_range: float
+
+    def cast(self, beams: Beams, origins: Array, directions: Array) -> tuple[Array, Array]:
+        """Casts in the map frame."""
+        del beams
+        ranges, faces = self.scene.cast(origins, directions, self.max_range)
+        return ranges, incidence(self.normals, faces, directions)
 
 
 class Airframe:
@@ -78,36 +98,83 @@ class Airframe:
 
 
 @dataclass(frozen=True, slots=True)
-class Ranger:
-    """Measures ranges in a world from a moving lidar.
+class Shots:
+    """Where beams began and what they hit, in the grid (A, B) of the beams.
 
     Attributes
     ----------
-    max_range : m, beyond it nothing returns
-    movers : what else can be hit
+    beams : where they truly point to
+    origins, directions : (A, B, 3) m, unit vectors; map frame
+    ranges : (A, B) m, infinite where nothing is hit
+    cosines : (A, B) of incidence, times the reflectivity where surfaces differ in it
     """
 
-    world: World
+    beams: Beams
+    origins: Array
+    directions: Array
+    ranges: Array
+    cosines: Array
+
+
+class RangeEffect(Protocol):
+    """Something that makes ranges wrong."""
+
+    def apply(self, shots: Shots) -> Shots:
+        """Return the shots with the ranges and cosines that the lidar gets."""
+        ...
+
+
+class Aim(Protocol):
+    """Where beams point to."""
+
+    def actual(self, beams: Beams) -> Beams:
+        """Return where the beams truly point to, given where they are said to."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Ranger:
+    """Measures ranges to bodies from a moving lidar.
+
+    Attributes
+    ----------
+    bodies : what can be hit, at least one
+    max_range : m, beyond it nothing returns
+    aim : where the beams point to, if not where they are said to
+    effects : what makes ranges wrong beside `errors`, in this order
+    """
+
+    bodies: Sequence[Body]
     rig: Rig
     errors: RangeErrors
     max_range: float
-    movers: Sequence[Mover]
     rng: np.random.Generator
+    aim: Aim | None = None
+    effects: Sequence[RangeEffect] = ()
 
     def measure(self, beams: Beams) -> tuple[Array, Array]:
         """Ranges (A, B), infinite where nothing returned, NaN where lost, and cosines of incidence."""
-        times = beams.times.ravel()
+        shots = self._shoot(beams if self.aim is None else self.aim.actual(beams))
+        for effect in self.effects:
+            shots = effect.apply(shots)
+        return self._spoil(shots.ranges, shots.cosines, beams.sweep_axis), shots.cosines
+
+    def _shoot(self, beams: Beams) -> Shots:
         nodes = nodes_around(beams, self.rig.lidar)
-        origins, directions = nodes.place(times, beams.directions.reshape(-1, 3))
-        ranges, faces = self.world.scene.cast(origins, directions, self.max_range)
-        cosines = incidence(self.world.normals, faces, directions)
-        for mover in self.movers:
-            nearer, mover_cosines = mover.cast(beams, origins, directions)
-            cosines = np.where(nearer < ranges, mover_cosines, cosines)
+        origins, directions = nodes.place(beams.times.ravel(), beams.directions.reshape(-1, 3))
+        ranges, cosines = self.bodies[0].cast(beams, origins, directions)
+        for body in self.bodies[1:]:
+            nearer, others = body.cast(beams, origins, directions)
+            cosines = np.where(nearer < ranges, others, cosines)
             ranges = np.minimum(ranges, nearer)
         grid = beams.times.shape
-        cosines = cosines.reshape(grid)
-        return self._spoil(ranges.reshape(grid), cosines, beams.sweep_axis), cosines
+        return Shots(
+            beams,
+            origins.reshape(*grid, 3),
+            directions.reshape(*grid, 3),
+            ranges.reshape(grid),
+            cosines.reshape(grid),
+        )
 
     def _spoil(self, ranges: Array, cosines: Array, sweep_axis: int) -> Array:
         e, rng = self.errors, self.rng

@@ -11,20 +11,11 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-POINT_FIELDS = [
-    ("x", 0, 7),
-    ("y", 4, 7),
-    ("z", 8, 7),
-    ("intensity", 12, 7),
-    ("ring", 16, 4),
-    ("time", 18, 7),
-]
-"""Name, offset and `sensor_msgs/PointField` datatype (7: float32, 4: uint16)."""
 POINT = np.dtype(
     {
-        "names": [name for name, _, _ in POINT_FIELDS],
-        "formats": ["<u2" if datatype == 4 else "<f4" for _, _, datatype in POINT_FIELDS],
-        "offsets": [offset for _, offset, _ in POINT_FIELDS],
+        "names": ["x", "y", "z", "intensity", "ring", "time"],
+        "formats": ["<f4", "<f4", "<f4", "<f4", "<u2", "<f4"],
+        "offsets": [0, 4, 8, 12, 16, 18],
         "itemsize": 22,
     }
 )
@@ -63,7 +54,7 @@ class CloudRecord:
     Attributes
     ----------
     stamp, arrival : s
-    points : (N,) structured: x, y, z, intensity float32, ring uint16, time float32
+    points : (N,) structured as `POINT`, or (H, W) as a driver packs whole revolutions
     """
 
     stamp: float

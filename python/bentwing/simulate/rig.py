@@ -50,6 +50,11 @@ class Encoder:
     zero: float
     sigma: float
 
+    def read(self, times: Array) -> Array:
+        """Return the angle (N,), rad, that it reads without noise."""
+        result: Array = self.angle(times)[:, 0] - self.zero
+        return result
+
 
 @dataclass(frozen=True, slots=True)
 class Head:

@@ -12,8 +12,6 @@ from rosbags.rosbag2 import Writer as Ros2Writer
 from rosbags.typesys import Stores, get_typestore
 
 from bentwing.simulate.records import (
-    POINT,
-    POINT_FIELDS,
     CloudRecord,
     EncoderRecord,
     FixRecord,
@@ -31,6 +29,9 @@ if TYPE_CHECKING:
 EPOCH_NS = 1_704_067_200_000_000_000
 """The recordings begin on 1 January 2024, 00:00 UTC."""
 
+
+DATATYPES = {"<f4": 7, "<u4": 6, "<u2": 4}
+"""Of `sensor_msgs/PointField`, by the format of a field."""
 
 Message = Any
 """A message or its class, made by `rosbags` at run time from ROS's own definitions."""
@@ -121,16 +122,21 @@ class BagWriter:
 
     def _cloud(self, record: CloudRecord, header: Message) -> Message:
         field = self._type("sensor_msgs/msg/PointField")
-        fields = [field(name, offset, datatype, 1) for name, offset, datatype in POINT_FIELDS]
+        kinds = record.points.dtype
+        fields = [
+            field(name, details[1], DATATYPES[details[0].str], 1)
+            for name, details in (kinds.fields or {}).items()
+        ]
+        height, width = record.points.shape if record.points.ndim == 2 else (1, record.points.size)
         data = np.frombuffer(record.points.tobytes(), dtype=np.uint8)
         return self._type("sensor_msgs/msg/PointCloud2")(
             header=header,
-            height=1,
-            width=len(record.points),
+            height=height,
+            width=width,
             fields=fields,
             is_bigendian=False,
-            point_step=POINT.itemsize,
-            row_step=POINT.itemsize * len(record.points),
+            point_step=kinds.itemsize,
+            row_step=kinds.itemsize * width,
             data=data,
             is_dense=True,
         )

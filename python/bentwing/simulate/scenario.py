@@ -11,10 +11,12 @@ from pydantic import Field, model_validator
 from bentwing.base.settings import Settings
 from bentwing.simulate.events import STALL, strong_bias
 from bentwing.simulate.imu import PERFECT, ImuErrors
-from bentwing.simulate.names import (  # noqa: TC001 - pydantic reads the annotations
+from bentwing.simulate.names import (
+    CAR_HEADS,
     EventName,
     FlightName,
     HeadName,
+    RealismGroup,
     ReceiverName,
     RecordingFormat,
     SceneName,
@@ -23,6 +25,9 @@ from bentwing.simulate.names import (  # noqa: TC001 - pydantic reads the annota
 from bentwing.simulate.ranging import RangeErrors
 
 _SURVEYED = ("walls", "dam")
+_DRIVEN = ("street",)
+FASTEST_TOUR = 5.0
+"""m/s."""
 
 
 class Scenario(Settings):
@@ -31,7 +36,8 @@ class Scenario(Settings):
     Attributes
     ----------
     scene : name of the world
-    head : sensor head and how it is moved; by default `hokuyo-spin`, for a town `vlp16-motor`
+    head : sensor head and how it is moved; by default `hokuyo-spin`, for a town `vlp16-motor`, for a
+        street `hdl64`
     duration : s
     seed : varies geometry, motion, calibration and noise
     flight_seed : varies all of that but the geometry: another flight in the world of `seed`; by
@@ -41,12 +47,15 @@ class Scenario(Settings):
     spin : of `hokuyo-spin`: a `steady` rate that wanders a little, or driven by the simulated `plant`
         of downdraft, vanes and controller
     max_range : m, beyond it the lidar sees nothing; by default what the sensor can do
-    speed : m/s, at about which a tour is flown; by default what suits the scene
+    speed : m/s, at about which a tour is flown or a road driven; by default what suits the scene
     events : what goes wrong
     stall : s, how long the head does not turn in the event `spin-stall`
     gnss : a receiver, `rtk` or `single`; by default there is none
-    flight : a tour from the ground and back, the site's line in the air (town, walls, dam), or none:
-        the head on a stand
+    flight : a tour from the ground and back, the site's line in the air (town, walls, dam), a drive
+        along its road (street), or none: the head on a stand
+    realism : size of the errors that real sensors have beyond noise: 0 for none, 1 for what is
+        usual, 3 for three times that
+    realism_only : groups of these errors; by default all
     calibrated : whether the payload has the head as it is, and the clocks agree
     noiseless : without random errors of the sensors (calibration and clock stay wrong)
     """
@@ -60,23 +69,45 @@ class Scenario(Settings):
     motor_rate: float = Field(default=1.0, gt=0.0, le=10.0)
     spin: SpinName = "steady"
     max_range: float | None = Field(default=None, gt=1.0)
-    speed: float | None = Field(default=None, gt=0.1, le=5.0)
+    speed: float | None = Field(default=None, gt=0.1, le=20.0)
     events: tuple[EventName, ...] = ()
     stall: float = Field(default=STALL, gt=0.0, le=60.0)
     gnss: ReceiverName | None = None
     flight: FlightName = "tour"
+    realism: float = Field(default=0.0, ge=0.0, le=3.0)
+    realism_only: tuple[RealismGroup, ...] = ()
     calibrated: bool = False
     noiseless: bool = False
 
     @model_validator(mode="before")
     @classmethod
     def _choose_head(cls, values: dict[str, Any]) -> dict[str, Any]:
-        """From 30 m above, a town is out of a Hokuyo's reach; walls and dam have but a survey."""
+        """From 30 m above, a town is out of a Hokuyo's reach; walls and dam have but a survey; a car drives."""
         scene = values.get("scene")
         far = scene in {"town", *_SURVEYED}
         chosen = {"head": "vlp16-motor" if far else "hokuyo-spin"}
         chosen["flight"] = "survey" if scene in _SURVEYED else "tour"
+        if scene in _DRIVEN:
+            chosen = {"head": "hdl64", "flight": "drive"}
         return {**values, **{k: v for k, v in chosen.items() if values.get(k) is None}}
+
+    @model_validator(mode="after")
+    def _groups_have_a_size(self) -> Scenario:
+        if self.realism_only and not self.realism:
+            msg = "realism_only chooses groups of errors that have no size: give realism as well"
+            raise ValueError(msg)
+        return self
+
+    @model_validator(mode="after")
+    def _can_be_driven(self) -> Scenario:
+        asked = [self.scene in _DRIVEN, self.flight == "drive", self.head in CAR_HEADS]
+        if any(asked) and not all(asked):
+            msg = f"a car with a head of {' or '.join(CAR_HEADS)} drives, and only in a street"
+            raise ValueError(msg)
+        if self.speed is not None and self.speed > FASTEST_TOUR and self.flight != "drive":
+            msg = f"speed: at most {FASTEST_TOUR:g} m/s in a tour, {self.speed:g} were asked for"
+            raise ValueError(msg)
+        return self
 
     @model_validator(mode="after")
     def _can_be_flown(self) -> Scenario:
@@ -102,7 +133,16 @@ class Scenario(Settings):
         """Errors of a lidar with range noise `sigma` (m)."""
         if self.noiseless:
             return RangeErrors(0.0, resolution=0.0, dropout=0.0, mixing=0.0)
-        return RangeErrors(sigma)
+        # Beams that have a width need no mixing by chance.
+        return RangeErrors(sigma, mixing=0.0) if self.realism_of("ranges") else RangeErrors(sigma)
+
+    def realism_of(self, group: RealismGroup) -> float:
+        """Return the size of one group of real sensors' errors."""
+        return self.realism if not self.realism_only or group in self.realism_only else 0.0
+
+    def doubt(self) -> float:
+        """Return how wrong the payload is, against the usual."""
+        return 0.0 if self.calibrated else max(1.0, self.realism_of("payload"))
 
     def rng(self, purpose: str) -> np.random.Generator:
         """Random numbers that depend on the seed and on what they are for."""

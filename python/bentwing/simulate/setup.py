@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from bentwing.simulate.realism.draw import Realism
     from bentwing.simulate.rig import Rig
     from bentwing.simulate.scenes import World
     from bentwing.simulate.stream import Sensors
@@ -19,6 +20,7 @@ class Setup:
     Attributes
     ----------
     first, last : s, what of the rig's motion is recorded
+    realism : what was drawn of real sensors' errors
     """
 
     world: World
@@ -26,3 +28,4 @@ class Setup:
     sensors: Sensors
     first: float
     last: float
+    realism: Realism

@@ -13,7 +13,8 @@ from bentwing.simulate.gnss import Receiver
 from bentwing.simulate.heads.build import build_rig
 from bentwing.simulate.imu import Imu
 from bentwing.simulate.lidars.interface import LidarClock
-from bentwing.simulate.ranging import Airframe, Mover, Ranger
+from bentwing.simulate.ranging import Airframe, Body, Ranger
+from bentwing.simulate.realism.draw import Realism
 from bentwing.simulate.scenes import SCENES, World
 from bentwing.simulate.setup import Setup
 from bentwing.simulate.stream import Sensors
@@ -33,29 +34,36 @@ def prepare(scenario: Scenario) -> Setup:
     last = first + scenario.duration
     site = SCENES[scenario.scene](scenario.rng("scene"))
     world = World(site if scenario.speed is None else replace(site, speed=scenario.speed))
-    rig = build_rig(scenario, world, last)
+    realism = Realism(scenario, last)
+    rig = realism.rig(build_rig(scenario, world, last))
     rng = scenario.rng("lidar")
     latency = float(rng.uniform(0.001, 0.004) * rng.choice([-1.0, 1.0]))
+    doubt = scenario.doubt()
     exact = scenario.noiseless or scenario.calibrated
-    clock = LidarClock(0.0 if scenario.calibrated else latency, 0.0 if exact else 1e-4)
-    imu = Imu(scenario.imu_errors(), scenario.rng("imu"), rig.carrier.activity)
-    ranger = Ranger(
-        world,
-        rig,
-        scenario.range_errors(rig.head.lidar.noise),
-        rig.head.lidar.max_range,
-        _movers(scenario, world, rig, 0.5 * (first + last)),
-        rng,
+    clock = LidarClock(latency * doubt if doubt else 0.0, 0.0 if exact else 1e-4)
+    imu = Imu(
+        scenario.imu_errors(),
+        scenario.rng("imu"),
+        rig.carrier.activity,
+        realism.response(),
+        realism.shocks(),
     )
+    lidar = rig.head.lidar
+    bodies = realism.bodies(world, lidar.max_range)
+    bodies += _movers(scenario, world, rig, 0.5 * (first + last))
+    errors, beams = scenario.range_errors(lidar.noise), realism.beams(lidar)
+    ranger = Ranger(bodies, rig, errors, lidar.max_range, rng, beams, realism.ranges(beams))
     receiver = None
     if scenario.gnss is not None:
         receiver = Receiver(scenario.gnss, scenario.rng("gnss"), rig.imu, scenario.noiseless)
-    sensors = Sensors(rig, ranger, imu, clock, _losses(scenario, first, last), rng, receiver)
-    return Setup(world, rig, sensors, first, last)
+    losses = _losses(scenario, first, last)
+    host, samples = realism.host(), realism.samples(rig)
+    sensors = Sensors(rig, ranger, imu, clock, losses, rng, receiver, host, samples)
+    return Setup(world, rig, sensors, first, last, realism)
 
 
-def _movers(scenario: Scenario, world: World, rig: Rig, middle: float) -> list[Mover]:
-    movers: list[Mover] = [Airframe(rig.head.airframe, rig)]
+def _movers(scenario: Scenario, world: World, rig: Rig, middle: float) -> list[Body]:
+    movers: list[Body] = [Airframe(rig.head.airframe, rig)]
     if "person" in scenario.events:
         near = rig.imu(np.array([middle])).p[0]
         movers.append(Person(world, scenario.rng("person"), near))

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from bentwing.simulate.gnss import Receiver
     from bentwing.simulate.lidars.interface import LidarClock
     from bentwing.simulate.ranging import Ranger
+    from bentwing.simulate.realism.samples import Samples
+    from bentwing.simulate.realism.stamps import Host
     from bentwing.simulate.rig import Encoder, Rig
 
     Array = NDArray[np.float64]
@@ -32,7 +34,13 @@ ENCODER_RATE_HZ = 200.0
 
 @dataclass(frozen=True, slots=True)
 class Sensors:
-    """The sensors on a rig; their states advance with the stream."""
+    """The sensors on a rig; their states advance with the stream.
+
+    Attributes
+    ----------
+    host : gives the stamps, if the sensors do not
+    samples : collects returns where they truly were
+    """
 
     rig: Rig
     ranger: Ranger
@@ -41,6 +49,8 @@ class Sensors:
     losses: Losses
     rng: np.random.Generator
     receiver: Receiver | None = None
+    host: Host | None = None
+    samples: Samples | None = None
 
     def stream(self, first: float, last: float) -> Iterator[tuple[float, float, list[Record]]]:
         """Measure from `first` to `last`, about a second at a time.
@@ -64,7 +74,11 @@ class Sensors:
         records += self._encoder(encoder, start, end) if encoder else []
         if self.receiver is not None:
             records += self.receiver.fixes(ticks(start, end, FIX_RATE_HZ))
-        return records
+        return records if self.host is None else self.host.recorded(records)
+
+    def latency(self) -> float:
+        """Return by how much the lidar's stamps are later than the IMU's, s."""
+        return self.clock.latency + (0.0 if self.host is None else self.host.latency())
 
     def _inertial(self, start: float, end: float) -> list[Record]:
         times = ticks(start, end, RATE_HZ)
@@ -79,12 +93,15 @@ class Sensors:
         if beams is None:
             return []
         ranges, cosines = self.ranger.measure(beams)
+        if self.samples is not None:
+            self.samples.add(beams, ranges)
         return lidar.records(beams, ranges, cosines, self.clock, self.rng)
 
     def _encoder(self, encoder: Encoder, start: float, end: float) -> list[Record]:
         times = ticks(start, end, ENCODER_RATE_HZ) + 0.0012
-        read = encoder.angle(times)[:, 0] - encoder.zero
-        angles = np.mod(read + self.rng.normal(0.0, encoder.sigma, len(times)), 2 * np.pi)
+        angles = np.mod(
+            encoder.read(times) + self.rng.normal(0.0, encoder.sigma, len(times)), 2 * np.pi
+        )
         arrivals = times + 0.001 + self.rng.exponential(0.0005, len(times))
         return [EncoderRecord(*row) for row in zip(times, arrivals, angles, strict=True)]
 

@@ -86,5 +86,5 @@ def calibration(setup: Setup, first_biases: Array, last_biases: Array) -> dict[s
         for when, values in (("start", first_biases), ("end", last_biases))
     }
     # A stamp τ of the lidar belongs to the IMU's time τ − latency.
-    latency = round(setup.sensors.clock.latency, 9)
+    latency = round(setup.sensors.latency(), 9)
     return {"latency": latency, **setup.rig.head.truth, "imu_biases": biases}

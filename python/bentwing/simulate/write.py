@@ -70,7 +70,7 @@ def write_recording(
     write_ply(files.scene, setup.world.site.mesh)
     if setup.sensors.receiver is not None:
         write_yaml(out / "truth_georeference.yaml", setup.sensors.receiver.truth())
-    biases = [setup.sensors.imu.biases.copy()]
+    biases = [setup.sensors.imu.biases_at(setup.first)]
     with BagWriter(files.recording, scenario.format) as bag, files.trajectory.open("w") as truth:
         for start, end, records in setup.sensors.stream(setup.first, setup.last):
             for record in records:
@@ -78,8 +78,11 @@ def write_recording(
             write_poses(truth, setup.rig, ticks(start, end, RATE_HZ))
             if progress:
                 progress(end - setup.first)
-    biases.append(setup.sensors.imu.biases.copy())
+    biases.append(setup.sensors.imu.biases_at(setup.last))
     write_yaml(files.calibration, calibration(setup, *biases))
+    if setup.sensors.samples is not None:
+        write_yaml(out / "truth_realism.yaml", setup.realism.truth())
+        setup.sensors.samples.write(out / "truth_points.npy", setup.first)
     return files
 
 

@@ -81,7 +81,15 @@ class Truth:
 
     @cached_property
     def best_points(self) -> Array:
-        """Some points (N, 3), m, of the map that true poses, mounts and latency make in flight."""
+        """Some points (N, 3), m, of the map that true poses, mounts and latency make in flight.
+
+        A simulation whose stamps and mounts are as real ones are leaves them; a reader of its
+        recording cannot know when late messages were truly measured.
+        """
+        if (self.folder / "truth_points.npy").exists():
+            rows = np.load(self.folder / "truth_points.npy")
+            first, last = self.flight
+            return np.ascontiguousarray(rows[(rows[:, 3] >= first) & (rows[:, 3] <= last), :3])
         lidar, angles = self.returns, self.returns.angles
         if angles is not None:
             # Read at the stamps of the lidar; the motor was there at the true times.

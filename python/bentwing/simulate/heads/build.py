@@ -7,12 +7,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bentwing.simulate.drive import drive
 from bentwing.simulate.events import reversing, turning
 from bentwing.simulate.heads.airframe import LEG_LENGTH
+from bentwing.simulate.heads.car import car_head
 from bentwing.simulate.heads.hokuyo_nod import NOD_STEP, hokuyo_nod
 from bentwing.simulate.heads.hokuyo_spin import hokuyo_spin
 from bentwing.simulate.heads.rates import SPIN_STEP, spin_angle, spin_drive
 from bentwing.simulate.heads.vlp16 import MOTOR_STEP, vlp16_fixed, vlp16_motor, vlp16_side
+from bentwing.simulate.lidars.hdl64 import hdl64
+from bentwing.simulate.lidars.os1 import os1_64
+from bentwing.simulate.names import CAR_HEADS
 from bentwing.simulate.plant.profile import driven_spin, flight_air
 from bentwing.simulate.rig import Head, Rig
 from bentwing.simulate.splines import knot_times
@@ -28,7 +33,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-HOKUYO_RANGE, VLP16_RANGE = 30.0, 100.0
+HOKUYO_RANGE, VLP16_RANGE, CAR_RANGE = 30.0, 100.0, 100.0
 
 
 def build_rig(scenario: Scenario, world: World, duration: float) -> Rig:
@@ -36,19 +41,21 @@ def build_rig(scenario: Scenario, world: World, duration: float) -> Rig:
     rng = scenario.rng("head")
     if scenario.head == "hokuyo-nod":
         return _nodding(scenario, world, rng, duration)
+    if scenario.head in CAR_HEADS:
+        return _driving(scenario, world, rng, duration)
     flight = _flight(scenario, world, duration)
     if scenario.head == "hokuyo-spin":
         return Rig(flight, _spun(scenario, flight, rng, duration))
     max_range = scenario.max_range or VLP16_RANGE
-    exact = scenario.calibrated
+    doubt = scenario.doubt()
     if scenario.head == "vlp16-fixed":
-        return Rig(flight, vlp16_fixed(rng, max_range, exact=exact))
+        return Rig(flight, vlp16_fixed(rng, max_range, doubt))
     if scenario.head == "vlp16-side":
-        return Rig(flight, vlp16_side(rng, max_range, exact=exact))
+        return Rig(flight, vlp16_side(rng, max_range, doubt))
     drive = _drive(scenario, MOTOR_STEP, duration)
     if "motor-reversal" in scenario.events:
         drive = drive * reversing(knot_times(MOTOR_STEP, duration), duration)
-    return Rig(flight, vlp16_motor(rng, scenario.motor_rate, drive, max_range, exact=exact))
+    return Rig(flight, vlp16_motor(rng, scenario.motor_rate, drive, max_range, doubt))
 
 
 def _flight(scenario: Scenario, world: World, duration: float) -> Flight:
@@ -70,14 +77,25 @@ def _spun(scenario: Scenario, flight: Flight, rng: np.random.Generator, duration
         spin = driven_spin(air, mean, scenario.rng("spin"), turning)
     else:
         spin = spin_angle(rng, mean, drive * turning)
-    return hokuyo_spin(rng, spin, scenario.max_range or HOKUYO_RANGE)
+    return hokuyo_spin(rng, spin, scenario.max_range or HOKUYO_RANGE, scenario.doubt())
+
+
+def _driving(scenario: Scenario, world: World, rng: np.random.Generator, duration: float) -> Rig:
+    carrier = drive(world, scenario.rng("drive"), duration)
+    max_range = scenario.max_range or CAR_RANGE
+    if scenario.head == "hdl64":
+        head = car_head(rng, hdl64(max_range), "generic", scenario.doubt())
+    else:
+        head = car_head(rng, os1_64(max_range), "ouster", scenario.doubt())
+    return Rig(carrier, head)
 
 
 def _nodding(scenario: Scenario, world: World, rng: np.random.Generator, duration: float) -> Rig:
     carrier = walk(world, scenario.rng("walk"), duration)
     walking = carrier.walking(knot_times(NOD_STEP, duration))
     drive = walking * _drive(scenario, NOD_STEP, duration)
-    return Rig(carrier, hokuyo_nod(rng, drive, scenario.max_range or HOKUYO_RANGE))
+    max_range = scenario.max_range or HOKUYO_RANGE
+    return Rig(carrier, hokuyo_nod(rng, drive, max_range, scenario.doubt()))
 
 
 def _drive(scenario: Scenario, step: float, duration: float) -> Array:

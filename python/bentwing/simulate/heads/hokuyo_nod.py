@@ -28,11 +28,13 @@ NOD_STEP = 0.05
 SELF_HITS = {"box": {"min": [-0.9, -0.5, -0.1], "max": [0.0, 0.5, 0.1]}}
 
 
-def hokuyo_nod(rng: np.random.Generator, drive: Array, max_range: float) -> Head:
-    """Build the nodding head; `drive` (0 … 1 at the knots of `NOD_STEP`) shakes the spring."""
+def hokuyo_nod(
+    rng: np.random.Generator, drive: Array, max_range: float, doubt: float = 1.0
+) -> Head:
+    """Build the nodding head; `drive` (0 … 1 at the knots of `NOD_STEP`) shakes the spring, `doubt` scales what is wrong."""
     lidar = Hokuyo(max_range=max_range)
     nominal = Mount(np.eye(3), np.array([0.01, 0.0, 0.06]))
-    true = nominal.perturbed(rng, np.radians(0.5), 0.004)
+    true = nominal.perturbed(rng, doubt * np.radians(0.5), doubt * 0.004)
     nod, roll = _swing(rng, drive)
     on_spring = Mount(np.eye(3), np.array([0.0, 0.0, 0.12]))
     return Head(

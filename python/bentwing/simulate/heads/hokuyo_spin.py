@@ -26,12 +26,14 @@ DOWN_LOOKING = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 SELF_HITS = {"box": {"min": [-0.3, -0.62, -0.62], "max": [0.32, 0.62, 0.62]}}
 
 
-def hokuyo_spin(rng: np.random.Generator, spin: Spline, max_range: float) -> Head:
-    """Build the bentwing payload, turned by `spin` about the carrier's z."""
+def hokuyo_spin(
+    rng: np.random.Generator, spin: Spline, max_range: float, doubt: float = 1.0
+) -> Head:
+    """Build the bentwing payload, turned by `spin` about the carrier's z; `doubt` scales what is wrong."""
     lidar = Hokuyo(max_range=max_range)
     T_spin_imu = Mount(np.eye(3), np.array([0.02, -0.01, -0.16]))
     nominal = Mount(DOWN_LOOKING, np.array([0.06, 0.01, 0.04]))
-    true = nominal.perturbed(rng, np.radians(0.5), 0.004)
+    true = nominal.perturbed(rng, doubt * np.radians(0.5), doubt * 0.004)
     return Head(
         to_imu=[Turn(np.array([0.0, 0.0, 1.0]), spin), T_spin_imu],
         to_lidar=[true],

@@ -14,7 +14,7 @@ import numpy as np
 from bentwing.simulate.heads.airframe import quadrotor
 from bentwing.simulate.heads.joints import Joint, Mount, Turn
 from bentwing.simulate.lidars.interface import described_lidar
-from bentwing.simulate.lidars.vlp16 import Vlp16
+from bentwing.simulate.lidars.vlp16 import vlp16
 from bentwing.simulate.rig import Encoder, Head
 from bentwing.simulate.splines import Spline
 
@@ -37,19 +37,19 @@ T_body_imu = Mount(np.eye(3), np.array([0.03, 0.0, 0.02]))
 MOTOR_STEP = 0.1
 
 
-def vlp16_fixed(rng: np.random.Generator, max_range: float, *, exact: bool = False) -> Head:
-    """Build the lidar level under the body; `exact` as its user believes it to be."""
-    return _fixed(rng, Mount(np.eye(3), np.array([0.02, 0.0, -0.14])), max_range, exact=exact)
+def vlp16_fixed(rng: np.random.Generator, max_range: float, doubt: float = 1.0) -> Head:
+    """Build the lidar level under the body; `doubt` scales what is wrong, at 0 nothing is."""
+    return _fixed(rng, Mount(np.eye(3), np.array([0.02, 0.0, -0.14])), max_range, doubt)
 
 
-def vlp16_side(rng: np.random.Generator, max_range: float, *, exact: bool = False) -> Head:
+def vlp16_side(rng: np.random.Generator, max_range: float, doubt: float = 1.0) -> Head:
     """Build the lidar on its side, as a motor at rest has it (Tazir 2020, eqs. 1 to 3)."""
-    return _fixed(rng, Mount(ON_ITS_SIDE, np.array([0.0, 0.0, -0.17])), max_range, exact=exact)
+    return _fixed(rng, Mount(ON_ITS_SIDE, np.array([0.0, 0.0, -0.17])), max_range, doubt)
 
 
-def _fixed(rng: np.random.Generator, nominal: Mount, max_range: float, *, exact: bool) -> Head:
-    lidar = Vlp16(max_range=max_range)
-    true = nominal if exact else nominal.perturbed(rng, np.radians(0.5), 0.004)
+def _fixed(rng: np.random.Generator, nominal: Mount, max_range: float, doubt: float) -> Head:
+    lidar = vlp16(max_range)
+    true = _true(nominal, rng, doubt, np.radians(0.5), 0.004)
     payload = {
         "lidar": described_lidar(lidar, "vlp16", min_range=0.5),
         "T_imu_lidar": nominal.as_dict(),
@@ -60,17 +60,17 @@ def _fixed(rng: np.random.Generator, nominal: Mount, max_range: float, *, exact:
 
 
 def vlp16_motor(
-    rng: np.random.Generator, rate: float, drive: Array, max_range: float, *, exact: bool = False
+    rng: np.random.Generator, rate: float, drive: Array, max_range: float, doubt: float = 1.0
 ) -> Head:
     """Build the lidar on a motor that turns at `rate` rad/s times `drive` (at the knots of `MOTOR_STEP`)."""
-    lidar = Vlp16(max_range=max_range)
+    lidar = vlp16(max_range)
     motor = Mount(np.eye(3), np.array([0.0, 0.0, -0.10]))
     nominal = Mount(ON_ITS_SIDE, np.array([0.0, 0.0, -0.07]))
     # What is unknown of T_imu_lidar sits before the motor, the misalignment behind it.
-    true_motor = motor if exact else motor.perturbed(rng, np.radians(0.3), 0.003)
-    true = nominal if exact else nominal.perturbed(rng, np.radians(0.25), 0.002)
+    true_motor = _true(motor, rng, doubt, np.radians(0.3), 0.003)
+    true = _true(nominal, rng, doubt, np.radians(0.25), 0.002)
     angle = _motor_angle(rng, rate, drive)
-    zero = 0.0 if exact else float(rng.uniform(-0.004, 0.004))
+    zero = doubt * float(rng.uniform(-0.004, 0.004)) if doubt else 0.0
     encoder = Encoder(angle, zero=zero, sigma=2e-4)
     payload = {
         "lidar": described_lidar(lidar, "vlp16", min_range=0.5),
@@ -80,6 +80,13 @@ def vlp16_motor(
     truth = {"encoder": {"zero": round(encoder.zero, 9), **_motor(true_motor, true)}}
     joints: list[Joint] = [true_motor, Turn(AXIS, angle), true]
     return Head([T_body_imu], joints, quadrotor(), lidar, payload, truth, encoder)
+
+
+def _true(
+    nominal: Mount, rng: np.random.Generator, doubt: float, angle: float, shift: float
+) -> Mount:
+    """Return a mount as it is, off by about `doubt` times an angle (rad) and a shift (m)."""
+    return nominal.perturbed(rng, doubt * angle, doubt * shift) if doubt else nominal
 
 
 def _motor(T_imu_motor: Mount, T_motor_lidar: Mount) -> dict[str, Any]:

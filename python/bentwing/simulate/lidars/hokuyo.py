@@ -33,6 +33,8 @@ class Hokuyo:
     max_range: float = 30.0
     topic: str = "/scan"
     noise: float = 0.01
+    rings: tuple[int, ...] = ()
+    beam_sigma: float = 0.0
 
     def beams(self, start: float, end: float) -> Beams | None:
         """Return scans that begin in [start, end)."""

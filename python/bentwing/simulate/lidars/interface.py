@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import numpy as np
     from numpy.typing import NDArray
 
@@ -54,6 +56,16 @@ class Lidar(Protocol):
     @property
     def max_range(self) -> float:
         """Range up to which it sees anything, m."""
+        ...
+
+    @property
+    def rings(self) -> Sequence[int]:
+        """Number of each beam of a multi-beam lidar, from below, in the columns of its `Beams`."""
+        ...
+
+    @property
+    def beam_sigma(self) -> float:
+        """Usual error of a beam's stated direction, rad."""
         ...
 
     def beams(self, start: float, end: float) -> Beams | None:

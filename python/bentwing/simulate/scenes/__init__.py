@@ -15,6 +15,7 @@ from bentwing.simulate.scenes.forest import forest
 from bentwing.simulate.scenes.mine import mine
 from bentwing.simulate.scenes.mocap import mocap
 from bentwing.simulate.scenes.office import office
+from bentwing.simulate.scenes.street import street
 from bentwing.simulate.scenes.town import town
 from bentwing.simulate.scenes.walls import walls
 from bentwing.simulate.scenes.world import Site, Survey, World
@@ -39,4 +40,5 @@ SCENES: dict[str, Callable[[np.random.Generator], Site]] = {
     "mocap": mocap,
     "carpark": carpark,
     "campus": campus,
+    "street": street,
 }

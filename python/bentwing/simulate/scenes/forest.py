@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing.simulate.scenes.mesh import Mesh, column, ground, merge, smooth_noise
+from bentwing.simulate.scenes.mesh import FOLIAGE, Mesh, column, ground, merge, smooth_noise
 from bentwing.simulate.scenes.world import Site
 
 if TYPE_CHECKING:
@@ -73,4 +73,5 @@ def leaves(rng: np.random.Generator, n: int, spread: tuple[float, ...], size: fl
     """Scatter `n` triangles of about `size` m around the origin."""
     centres = rng.normal(0.0, 1.0, (n, 1, 3)) * spread
     corners = centres + rng.normal(0.0, size, (n, 3, 3))
-    return Mesh(corners.reshape(-1, 3), np.arange(3 * n, dtype=np.uint32).reshape(-1, 3))
+    triangles = np.arange(3 * n, dtype=np.uint32).reshape(-1, 3)
+    return Mesh(corners.reshape(-1, 3), triangles).made_of(FOLIAGE)

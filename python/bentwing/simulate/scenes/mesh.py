@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,6 +17,9 @@ if TYPE_CHECKING:
     Field = Callable[[Array], Array]
 
 
+SOLID, GLASS, FOLIAGE = range(3)
+
+
 @dataclass(frozen=True, slots=True)
 class Mesh:
     """Triangles.
@@ -25,16 +28,33 @@ class Mesh:
     ----------
     vertices : (V, 3) float64, m
     triangles : (T, 3) uint32, indices into `vertices`
+    materials : (T,) uint8, `SOLID`, `GLASS` or `FOLIAGE`; None where all are solid
     """
 
     vertices: Array
     triangles: NDArray[np.uint32]
+    materials: NDArray[np.uint8] | None = None
 
     def moved(self, at: ArrayLike, yaw: float = 0.0) -> Mesh:
         """Return the mesh turned about the vertical axis through the origin, then shifted by `at`."""
         c, s = np.cos(yaw), np.sin(yaw)
         turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-        return Mesh(self.vertices @ turn.T + np.asarray(at), self.triangles)
+        return Mesh(self.vertices @ turn.T + np.asarray(at), self.triangles, self.materials)
+
+    def made_of(self, material: int) -> Mesh:
+        """Return the mesh, all of one material."""
+        return replace(self, materials=np.full(len(self.triangles), material, dtype=np.uint8))
+
+    def of(self, material: int) -> NDArray[np.bool_]:
+        """Tell which triangles (T,) are of the material."""
+        if self.materials is None:
+            return np.full(len(self.triangles), material == SOLID)
+        return np.asarray(self.materials == material)
+
+    def only(self, chosen: NDArray[np.bool_]) -> Mesh:
+        """Return some of the triangles."""
+        kinds = None if self.materials is None else self.materials[chosen]
+        return Mesh(self.vertices, np.ascontiguousarray(self.triangles[chosen]), kinds)
 
 
 def merge(meshes: Iterable[Mesh]) -> Mesh:
@@ -43,7 +63,11 @@ def merge(meshes: Iterable[Mesh]) -> Mesh:
     offsets = np.cumsum([0, *(len(part.vertices) for part in parts[:-1])])
     triangles = [part.triangles + np.uint32(o) for part, o in zip(parts, offsets, strict=True)]
     vertices = np.ascontiguousarray(np.vstack([part.vertices for part in parts]))
-    return Mesh(vertices, np.vstack(triangles))
+    if all(part.materials is None for part in parts):
+        return Mesh(vertices, np.vstack(triangles))
+    none = [np.full(len(part.triangles), SOLID, dtype=np.uint8) for part in parts]
+    kinds = [n if p.materials is None else p.materials for n, p in zip(none, parts, strict=True)]
+    return Mesh(vertices, np.vstack(triangles), np.concatenate(kinds))
 
 
 def box(low: ArrayLike, high: ArrayLike) -> Mesh:

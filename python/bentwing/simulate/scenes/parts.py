@@ -8,7 +8,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing.simulate.scenes.mesh import Mesh, ball, box, column, merge, quad, smooth_noise
+from bentwing.simulate.scenes.mesh import (
+    FOLIAGE,
+    GLASS,
+    Mesh,
+    ball,
+    box,
+    column,
+    merge,
+    quad,
+    smooth_noise,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -40,9 +50,11 @@ def _inside(point: tuple[float, float], opening: Opening) -> bool:
 
 def _reveal(opening: Opening, d: float) -> Mesh:
     x0, x1, z0, z1 = opening
+    pane = quad([(x0, d, z0), (x1, d, z0), (x1, d, z1), (x0, d, z1)])
     return merge(
         [
-            quad([(x0, d, z0), (x1, d, z0), (x1, d, z1), (x0, d, z1)]),
+            # A door reaches to the ground.
+            pane.made_of(GLASS) if z0 > 0.0 else pane,
             quad([(x0, 0, z0), (x0, d, z0), (x0, d, z1), (x0, 0, z1)]),
             quad([(x1, d, z0), (x1, 0, z0), (x1, 0, z1), (x1, d, z1)]),
             quad([(x0, 0, z0), (x1, 0, z0), (x1, d, z0), (x0, d, z0)]),
@@ -63,7 +75,7 @@ def tree(rng: np.random.Generator, height: float) -> Mesh:
     """Build a trunk and a bumpy crown, standing on the origin."""
     trunk = column((0.09 * height**0.5, 0.05 * height**0.5), 0.6 * height, 9)
     crown = ball([0.24 * height, 0.24 * height, 0.3 * height], 9, smooth_noise(rng, 0.8, 0.12, 3))
-    return merge([trunk, crown.moved((0.0, 0.0, 0.7 * height))])
+    return merge([trunk, crown.moved((0.0, 0.0, 0.7 * height)).made_of(FOLIAGE)])
 
 
 def car() -> Mesh:

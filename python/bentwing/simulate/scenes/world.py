@@ -46,6 +46,7 @@ class Site:
     speed : m/s, at which one flies here
     survey : the line to fly instead of a tour through the box, where there is one
     route : corners of a closed way, m, that a tour follows here instead of choosing its own
+    road : points on the ground, m, along which a car drives
     """
 
     mesh: Mesh
@@ -55,6 +56,7 @@ class Site:
     speed: float
     survey: Survey | None = None
     route: tuple[Point, ...] = ()
+    road: tuple[Point, ...] = ()
 
 
 class World:

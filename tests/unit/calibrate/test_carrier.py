@@ -10,7 +10,10 @@ import pytest
 import yaml
 
 from bentwing.base import geometry
+from bentwing.base.mount import MotorMount, Pose
+from bentwing.base.voxels import voxel_keys
 from bentwing.calibrate.carrier import CarrierWatch, carrier_warnings
+from bentwing.calibrate.carrier.view import EDGE, View
 from bentwing.recording import LidarBatch, Payload
 from bentwing.recording.preprocess.self_hits import outside_boxes
 
@@ -145,3 +148,16 @@ def test_nothing_is_said_where_the_payload_has_boxes_or_nothing_is_seen():
     boxes = found(flight()[0])
     assert carrier_warnings(Payload(self_hits=boxes), boxes) == []
     assert carrier_warnings(Payload(), ()) == []
+
+
+def test_a_lidar_on_a_motor_is_turned_back_to_axes_that_stand_on_the_carrier():
+    rng = np.random.default_rng(5)
+    axis = np.array([0.48, -0.6, 0.64])
+    lidar = Pose(np.zeros(3), geometry.exp(np.array([0.3, -0.2, 1.0])))
+    mount = MotorMount(Pose.identity(), axis, 0.3, lidar)
+    points, angles = rng.uniform(-1.0, 1.0, (40, 3)), rng.uniform(-9.0, 9.0, 40)
+    view = View.of([LidarBatch(points, np.linspace(0.0, 1.0, 40), angles=angles)], mount)
+    standing = [
+        mount.lidar_at(angle).R @ point for angle, point in zip(angles, points, strict=True)
+    ]
+    np.testing.assert_array_equal(view.cells, voxel_keys(np.array(standing), EDGE))

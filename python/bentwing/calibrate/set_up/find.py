@@ -14,7 +14,7 @@ from bentwing.calibrate.set_up.planar import describe_by_trials
 from bentwing.calibrate.set_up.refine import refined
 from bentwing.calibrate.set_up.set_up import SetUp
 from bentwing.calibrate.set_up.spatial import NotFoundError, describe_by_motion, followed
-from bentwing.calibrate.set_up.stretch import Stretch, read_stretch
+from bentwing.calibrate.set_up.stretch import read_stretch
 from bentwing.calibrate.set_up.units import with_imu_units, with_range_unit
 from bentwing.odometry.planar import is_plane
 from bentwing.recording import EncoderBatch, Recording
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from bentwing.calibrate.set_up.motor import Joint
+    from bentwing.calibrate.set_up.stretch import Stretch
     from bentwing.recording import Payload
 
 LOOKED_AT = 5000  # points that tell a 2D lidar from a 3D one
@@ -102,8 +103,7 @@ def _with_motor(
     assert found.encoder is not None
     angles = joints[found.encoder.joint, found.encoder.unit]
     signed = EncoderBatch(angles.times, found.encoder.sign * angles.angles)
-    others = tuple(b for b in stretch.batches if not isinstance(b, EncoderBatch))
-    return found, Stretch((signed, *others))
+    return found, stretch.with_encoder(signed)
 
 
 def _joints(

@@ -89,7 +89,7 @@ def fit_gyro(motion: LidarMotion, imu: ImuBatch, delays: Sequence[float] | None 
     delay = float(max(delays, key=lambda d: _correlation(motion, gyro, d)))
     rates, readings = _pairs(motion, gyro, delay)
     direct, mirrored = (_orthogonal(rates, readings, hand) for hand in (1.0, -1.0))
-    third = np.linalg.svd(rates / np.sqrt(max(len(rates), 1)), compute_uv=False)[-1]
+    spread = np.sqrt(np.maximum(np.linalg.eigvalsh(rates.T @ rates / max(len(rates), 1)), 0.0))
     if direct[2] <= mirrored[2]:
         best, other = direct, mirrored
     else:
@@ -102,7 +102,7 @@ def fit_gyro(motion: LidarMotion, imu: ImuBatch, delays: Sequence[float] | None 
         _correlation(motion, gyro, delay),
         best[2],
         other[2],
-        bool(third > LEAST_THIRD),
+        bool(spread[0] > LEAST_THIRD),
     )
 
 

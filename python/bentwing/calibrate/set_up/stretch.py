@@ -67,6 +67,22 @@ class Stretch:
             np.concatenate([b.times for b in parts]), np.concatenate([b.angles for b in parts])
         )
 
+    def with_encoder(self, angles: EncoderBatch) -> Stretch:
+        """Return the same with other angles of the motor, each as soon as the lidar needs it."""
+        batches: list[Batch] = []
+        first = 0
+        for batch in self.batches:
+            if isinstance(batch, EncoderBatch):
+                continue
+            if isinstance(batch, LidarBatch) and len(batch.times):
+                last = int(np.searchsorted(angles.times, batch.times[-1] + AROUND))
+                if last > first:
+                    part = slice(first, last)
+                    batches.append(EncoderBatch(angles.times[part], angles.angles[part]))
+                first = max(first, last)
+            batches.append(batch)
+        return Stretch(tuple(batches))
+
     @property
     def without_imu(self) -> Stretch:
         """The same without inertial samples."""

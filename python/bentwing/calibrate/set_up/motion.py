@@ -10,7 +10,9 @@ import numpy as np
 
 from bentwing.base import geometry
 from bentwing.base.trajectory import DT
+from bentwing.calibrate.set_up import edits
 from bentwing.odometry.continuous.estimator import Continuous
+from bentwing.recording.sections.section import Transform
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -20,7 +22,7 @@ if TYPE_CHECKING:
     from bentwing.recording import Payload
 
 HALF = 0.05  # s on both sides over which rates are averaged
-LONG_HALF = 0.15  # s, for accelerations: the lidar's positions are no better than millimetres
+LONG_HALF = 0.4  # s, for accelerations: the lidar's positions are no better than millimetres
 SETTLING = 1.0  # s until the odometry has something to match with
 
 
@@ -56,7 +58,7 @@ def lidar_motion(stretch: Stretch, payload: Payload, threads: int | None = None)
     EstimationError
         The lidar cannot be followed by itself.
     """
-    alone = payload.model_copy(update={"imu": None, "T_imu_lidar": None})
+    alone = _alone(payload)
     engine = Continuous(alone, threads=threads)
     for batch in stretch.preprocessed(alone):
         if hasattr(batch, "points"):
@@ -78,3 +80,9 @@ def lidar_motion(stretch: Stretch, payload: Payload, threads: int | None = None)
         (bends / (long * DT) ** 2)[settled],
         tuple(found.windows),
     )
+
+
+def _alone(payload: Payload) -> Payload:
+    """Return the payload of the lidar and its motor, without the IMU that carries them."""
+    bare = payload.model_copy(update={"imu": None, "T_imu_lidar": None})
+    return bare if bare.encoder is None else edits.with_encoder(bare, T_imu_motor=Transform())

@@ -69,6 +69,8 @@ def describe_by_trials(
         described = edits.with_latency(edits.with_axes(payload, gyro, np.eye(3)), delay)
         if (found := trials.searched(described, centre)) is not None:
             return found
+    if has_mount and (found := trials.with_other_axes(edits.with_latency(payload, delays[0]))):
+        return found
     raise NotFoundError(trials.failure)
 
 
@@ -98,6 +100,17 @@ class _Trials:
         glances.sort(key=lambda glance: -glance.score)
         confirmed = (self._confirmed(payload, glance) for glance in glances[:SECOND_GLANCES])
         return next((found for found in confirmed if found is not None), None)
+
+    def with_other_axes(self, payload: Payload) -> Payload | None:
+        """Look for other axes of the gyro, of the accelerometer, or of both."""
+        plain = np.eye(3)
+        tried = [P for P in axes.signed_permutations() if not np.array_equal(P, plain)]
+        left = [(P, P) for P in tried if np.linalg.det(P) < 0.0]
+        for gyro, accel in [*((P, plain) for P in tried), *((plain, P) for P in tried), *left]:
+            glance = self._tried(edits.with_axes(payload, gyro, accel), CLOSE, GLANCE)
+            if glance.is_promising and (found := self._confirmed(glance.payload, glance)) is not None:
+                return found
+        return None
 
     def _confirmed(self, payload: Payload, glance: Trial) -> Payload | None:
         """Return what a glance has learned if all fits together with it."""

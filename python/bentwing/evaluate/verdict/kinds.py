@@ -123,6 +123,12 @@ KINDS: dict[str, Kind] = {
         "the trajectory turns otherwise than the gyro says, by {degrees:.2f} °/s{when}",
         "check T_imu_lidar, the gyro's axes and scale, and the clocks",
     ),
+    "scale": Kind(
+        4, 0.03, 0.15,
+        "the path is {times:.2f} times as long as the accelerometer says: the ranges of the lidar, or "
+        "the accelerometer, have a wrong scale",
+        "check the unit and the scale of both",
+    ),
     "accelerometer": Kind(
         8, 0.5, 3.0,
         "the trajectory moves otherwise than the accelerometer says, by {force:.2f} m/s²{when}",

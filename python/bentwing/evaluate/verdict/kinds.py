@@ -88,7 +88,7 @@ KINDS: dict[str, Kind] = {
         "check the lidar, its driver, and whether points and times belong together",
     ),
     "slice": Kind(
-        3, 0.9, 0.98,
+        3, 0.95, 0.985,
         "the plane of the 2D lidar stays the same: the map is one slice of the surroundings",
         "spin or nod the lidar, or use a 2D SLAM program",
     ),

@@ -312,7 +312,7 @@ def test_a_break_that_is_a_guess_is_doubtful(outcome):
 
 def test_the_gravest_reason_decides_and_a_cause_comes_before_its_effects():
     fast = Evidence("speed", 99.0, (), {"at": 1.0})
-    loose, level = Evidence("loop", 0.5), Evidence("slice", 0.95)
+    loose, level = Evidence("loop", 0.5), Evidence("slice", 0.97)
     found = verdict_of([fast, Evidence("gravity", 0.5), level, loose])
     assert found.state == "failed"
     assert [r.kind for r in found.reasons] == ["loop", "speed", "slice", "gravity"]

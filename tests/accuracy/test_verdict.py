@@ -20,7 +20,7 @@ FAULTS = {
     "imu-10hz": {"imu_period", "lost"},
     "elevator": {"accelerometer"},
     "lidar-late-0.5": {"matches"},
-    "ranges-1.3": {"accelerometer"},
+    "ranges-1.3": {"scale"},
     "ranges-random": {"scatter"},
     "ranges-constant": {"even_ranges"},
 }

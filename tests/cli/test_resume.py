@@ -65,7 +65,7 @@ def test_it_ends_with_the_same_bytes_wherever_it_was_killed(seed, asked, undistu
     assert left == sorted(path.name for path in undisturbed.iterdir())
     ours, theirs = record_of(out), record_of(undisturbed)
     assert ours["complete"]
-    for key in ("counts", "windows", "calibration", "segments", "files", "warnings"):
+    for key in ("counts", "windows", "calibration", "segments", "files", "warnings", "verdict"):
         assert ours[key] == theirs[key], key
 
 

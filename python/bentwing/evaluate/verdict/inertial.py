@@ -32,6 +32,9 @@ STEP = 0.5
 """s, over which turns and changes of velocity are compared."""
 _SAMPLES = 50
 _FEWEST = 6  # steps that say something
+_EXPLAINED = 0.5  # of the squared residuals is left where a scale explains them
+# Of the acceleration; a path that is longer than twice what it should be is noise of the poses.
+_MOST = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,12 +46,14 @@ class Steps:
     times : (K,) s, middle of the steps
     rates : (K, 3) rad/s, by which the trajectory turns otherwise than the gyro says
     forces : (K, 3) m/s², by which it accelerates otherwise than the accelerometer says
+    accelerations : (K, 3) m/s², of the trajectory
     up : (K, 3) m/s², mean measured force
     """
 
     times: Array
     rates: Array
     forces: Array
+    accelerations: Array
     up: Array
 
 
@@ -60,16 +65,26 @@ def judge_inertial(estimate: Estimate, track: InertialTrack, imu: Imu | None) ->
     parts = [_steps(part, estimate, track, sigmas) for part in _covered(estimate, track)]
     if sum(len(part.times) for part in parts) < _FEWEST:
         return []
-    times, rates, forces, up = (
+    times, rates, forces, accelerations, up = (
         np.concatenate([getattr(part, name) for part in parts])
-        for name in ("times", "rates", "forces", "up")
+        for name in ("times", "rates", "forces", "accelerations", "up")
     )
     gravity = float(np.linalg.norm(up.mean(axis=0)))
     return [
         _evidence("gyro", times, rates, sigmas.rate, {"degrees": float(np.degrees(_rms(rates)))}),
         _evidence("accelerometer", times, forces, sigmas.force, {"force": _rms(forces)}),
         Evidence("gravity", abs(gravity - STANDARD_GRAVITY)),
+        _scale(forces, accelerations),
     ]
+
+
+def _scale(forces: Array, accelerations: Array) -> Evidence:
+    """Judge by how much too long the trajectory is, where that explains how it moves otherwise."""
+    share = float((forces * accelerations).sum() / max(float((accelerations**2).sum()), 1e-12))
+    left = float(((forces - share * accelerations) ** 2).sum())
+    explains = left < _EXPLAINED * float((forces**2).sum()) and abs(share) < _MOST
+    times = 1.0 / (1.0 - share) if explains else 1.0
+    return Evidence("scale", abs(times - 1.0), (), {"times": times})
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,15 +137,18 @@ def _steps(part: Trajectory, estimate: Estimate, track: InertialTrack, sigmas: _
     # The last step has no neighbour, and what is left behind it is none.
     starts = np.arange(0, len(times) - _SAMPLES, _SAMPLES, dtype=np.intp)
     moved = _second_differences(part.positions, accelerations, dt, starts)
+    travelled = _second_differences(part.positions, np.zeros_like(accelerations), dt, starts)
     n = len(moved)
     turned = np.add.reduceat(turned, starts)[:n] / STEP
     up = np.add.reduceat(geometry.rotate(halfway, forces), starts)[:n] / _SAMPLES
     at, bodies = times[starts[:n]] + 0.5 * STEP, quats[starts[:n] + _SAMPLES // 2]
     keep = _heard(at, track)
-    at, turned, moved, up, bodies = (x[keep] for x in (at, turned, moved, up, bodies))
+    at, turned, moved, travelled, up, bodies = (
+        x[keep] for x in (at, turned, moved, travelled, up, bodies)
+    )
     turned = _unbiased(turned / sigmas.rate, bodies, estimate, "gyro_bias", sigmas.rate)
     moved = _unbiased(moved / sigmas.force, bodies, estimate, "accel_bias", sigmas.force)
-    return Steps(at, turned * sigmas.rate, moved * sigmas.force, up)
+    return Steps(at, turned * sigmas.rate, moved * sigmas.force, travelled, up)
 
 
 def _second_differences(

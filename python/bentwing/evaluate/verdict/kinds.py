@@ -88,7 +88,7 @@ KINDS: dict[str, Kind] = {
         "check the lidar, its driver, and whether points and times belong together",
     ),
     "slice": Kind(
-        3, 0.9, 0.98,
+        3, 0.95, 0.985,
         "the plane of the 2D lidar stays the same: the map is one slice of the surroundings",
         "spin or nod the lidar, or use a 2D SLAM program",
     ),
@@ -122,6 +122,12 @@ KINDS: dict[str, Kind] = {
         7, 2.0, 6.0,
         "the trajectory turns otherwise than the gyro says, by {degrees:.2f} °/s{when}",
         "check T_imu_lidar, the gyro's axes and scale, and the clocks",
+    ),
+    "scale": Kind(
+        4, 0.03, 0.15,
+        "the path is {times:.2f} times as long as the accelerometer says: the ranges of the lidar, or "
+        "the accelerometer, have a wrong scale",
+        "check the unit and the scale of both",
     ),
     "accelerometer": Kind(
         8, 0.5, 3.0,

@@ -134,6 +134,16 @@ def test_an_imu_that_is_wrong_is_named(change, kind):
     assert kind in kinds(estimate(), watched(change))
 
 
+@pytest.mark.parametrize("times", [0.8, 1.05, 1.3])
+def test_ranges_of_a_wrong_scale_are_told_with_the_factor(times):
+    found = estimate()
+    scaled = replace(found.trajectory, positions=times * found.trajectory.positions)
+    verdict = verdict_of(judge_estimate(replace(found, trajectory=scaled), PAYLOAD, watched()))
+    (reason,) = [r for r in verdict.reasons if r.kind == "scale"]
+    assert reason.value == pytest.approx(abs(times - 1.0), rel=0.1, abs=0.01)
+    assert "times as long as the accelerometer says" in reason.sentence
+
+
 def test_an_imu_that_samples_too_slowly_is_named():
     assert "imu_period" in kinds(estimate(), watched(step=0.1))
 
@@ -302,7 +312,7 @@ def test_a_break_that_is_a_guess_is_doubtful(outcome):
 
 def test_the_gravest_reason_decides_and_a_cause_comes_before_its_effects():
     fast = Evidence("speed", 99.0, (), {"at": 1.0})
-    loose, level = Evidence("loop", 0.5), Evidence("slice", 0.95)
+    loose, level = Evidence("loop", 0.5), Evidence("slice", 0.97)
     found = verdict_of([fast, Evidence("gravity", 0.5), level, loose])
     assert found.state == "failed"
     assert [r.kind for r in found.reasons] == ["loop", "speed", "slice", "gravity"]

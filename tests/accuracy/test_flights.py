@@ -128,3 +128,10 @@ def test_closing_the_loops_improves_a_flight_that_comes_back(flown):
     assert flight.record["loop_closure"]["applied"]
     assert flight.score.ate_flight < open_loop
     assert flight.score.ate < 0.3 * RANGE_SIGMA
+
+
+def test_expected_errors_are_about_as_large_as_the_true_ones(flight):
+    """Twice the 68 % radius holds 95 % of the errors of an honest statement, three times it all."""
+    expected = flight.record["expected_accuracy"]
+    assert flight.score.worst < 3 * np.hypot(expected["horizontal"], expected["vertical"])
+    assert expected["horizontal"] < 5 * RANGE_SIGMA

@@ -114,7 +114,7 @@ def lacks_gravity(times: NDArray[np.float64], accel: NDArray[np.float64]) -> boo
         return False
     totals = np.vstack([np.zeros(3), np.cumsum(accel, axis=0)])
     means = np.linalg.norm(totals[n:] - totals[:-n], axis=1) / n
-    return bool(0.0 < np.median(np.linalg.norm(accel, axis=1)) and means.min() < NO_GRAVITY)
+    return bool(np.median(np.linalg.norm(accel, axis=1)) > 0.0 and means.min() < NO_GRAVITY)
 
 
 def gyro_scale(

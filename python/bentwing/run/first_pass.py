@@ -100,7 +100,11 @@ class FirstPass:
             *part.recording.warnings,
             *carrier_warnings(part.payload, self._carrier.boxes()),
         ]
-        evidence = () if found.estimate is None else judge_estimate(found.estimate, part.payload, self._watch)
+        evidence = (
+            ()
+            if found.estimate is None
+            else judge_estimate(found.estimate, part.payload, self._watch)
+        )
         return replace(
             found,
             reading=Reading(dict(part.recording.counts + self._counts), warnings),

@@ -66,7 +66,7 @@ def map_flights(
         flights={n: [p.resolve() for p in f] for n, f in zip(names, flights, strict=True)},
     )
     for paths in flights:
-        with opened(paths, settings):
+        with opened(paths, settings, shown):
             pass  # none of them is mapped where another cannot be
     with RunFolder(Path(out), merging.to_json()) as folder:
         runs = [folder.path / RUNS / name for name in names]
@@ -96,9 +96,14 @@ def _is_mapped(run: Path, paths: Sequence[Path], settings: RunSettings) -> bool:
         record = read_record(run)
     except UsageError:
         return False
-    wanted = {**settings.to_json(), "threads": None}
+    # Where the head had to be found, the run has another payload than was asked for.
+    free = {"threads", "payload"} if record.get("set_up") else {"threads"}
+    used, wanted = (
+        {name: value for name, value in described.items() if name not in free}
+        for described in (record.get("settings") or {}, settings.to_json())
+    )
     return (
         bool(record.get("complete"))
         and record.get("recordings") == [str(path.resolve()) for path in paths]
-        and {**(record.get("settings") or {}), "threads": None} == wanted
+        and used == wanted
     )

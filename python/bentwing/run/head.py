@@ -90,7 +90,11 @@ class Head:
         if defects and not self.settings.trust_payload:
             found = self.found()
             if found.doubt is not None:
-                msg = f"{_listed([*defects])} ({found.doubt})" if self._lacks_mount else _listed(defects)
+                msg = (
+                    f"{_listed([*defects])} ({found.doubt})"
+                    if self._lacks_mount
+                    else _listed(defects)
+                )
                 raise RecordingError(f"{msg}; {ALL_THE_SAME}")
             self.use(found)
             defects = judge(self.recording, has_payload=True).defects

@@ -159,9 +159,7 @@ def make_map(job: Job, found: Found) -> Found:
     sigma = part.payload.lidar.range_sigma
     evidence = judge_revisits(written.revisits, sigma)
     accuracy = expected_accuracy(estimate.trajectory, estimate.covariances, sigma)
-    return replace(
-        found, map=written, accuracy=accuracy, evidence=(*found.evidence, *evidence)
-    )
+    return replace(found, map=written, accuracy=accuracy, evidence=(*found.evidence, *evidence))
 
 
 def _known(found: Found) -> Estimate:

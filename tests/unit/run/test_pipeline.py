@@ -108,7 +108,10 @@ def record_of(out):
 def test_a_run_leaves_all_files_of_the_contract(tmp_path, recording):
     out = tmp_path / "out"
     run = pipeline.map_recording(recording, PAYLOAD, out)
-    names = {"trajectory.txt", "odometry.txt", "map.laz", "map_top.png", "report.html", "run.json"}
+    names = {
+        "trajectory.txt", "trajectory_covariance.txt", "odometry.txt", "map.laz", "map_top.png",
+        "report.html", "run.json",
+    }  # fmt: skip
     assert {file.name for file in out.iterdir()} == names
     counts = record_of(out)["counts"]
     assert (
@@ -215,7 +218,8 @@ def test_an_interrupt_while_mapping_leaves_the_trajectory_and_no_half_map(
         pipeline.map_recording(recording, PAYLOAD, tmp_path / "out")
     record = record_of(tmp_path / "out")
     assert (record["stage"], record["reason"]) == ("map", "interrupted")
-    assert record["files"] == ["odometry.txt", "trajectory.txt", "checkpoint.npz", "report.html"]
+    named = ["odometry.txt", "trajectory.txt", "trajectory_covariance.txt"]
+    assert record["files"] == [*named, "checkpoint.npz", "report.html"]
     assert {f.name for f in (tmp_path / "out").iterdir()} == {*record["files"], "run.json"}
 
 

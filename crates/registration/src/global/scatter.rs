@@ -49,3 +49,45 @@ impl Scatter {
         ratios.iter().sum::<f64>() / ratios.len() as f64
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::RowGroup;
+
+    /// A link with `n` rows along x at one control point, whose residuals are `residual(k)`.
+    fn link(n: usize, residual: impl Fn(usize) -> f64) -> NormalEquations {
+        let mut equations = NormalEquations::new(1);
+        let mut group = RowGroup::new([0]);
+        for k in 0..n {
+            group.clear_row();
+            group.knots_mut()[3] = 1.0;
+            group.add(residual(k), 1.0);
+        }
+        group.flush(&mut equations);
+        equations
+    }
+
+    fn dispersion(residual: impl Fn(usize) -> f64) -> f64 {
+        let mut scatter = Scatter::new(3);
+        scatter.add(&link(100, residual), &[2]);
+        scatter.dispersion()
+    }
+
+    #[test]
+    fn residuals_that_cancel_do_not_scatter_and_common_ones_scatter_as_one() {
+        assert!(dispersion(|k| if k % 2 == 0 { 1.0 } else { -1.0 }).abs() < 1e-12);
+        assert!((dispersion(|_| 1.0) - 100.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn larger_residuals_scatter_by_their_square() {
+        let ratio = dispersion(|k| (k as f64).sin() * 3.0) / dispersion(|k| (k as f64).sin());
+        assert!((ratio - 9.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn without_matches_rows_count_as_independent() {
+        assert_eq!(Scatter::new(4).dispersion(), 1.0);
+    }
+}

@@ -164,6 +164,19 @@ fn a_slow_drift_is_taken_out_of_laps_through_a_room() -> Result<(), SolveError> 
     assert!(left < 2e-3, "{left} m are left of the drift");
     assert!(found.converged, "{:?}", found.iterations);
     assert!(found.iterations[1].n_far > 1000);
+    let stds = |at: &[f64]| -> Vec<f64> {
+        let variances = found.posterior.at(0, at);
+        variances.iter().map(|c| c[(3, 3)].sqrt()).collect()
+    };
+    let times: Vec<f64> = (0..12).map(|k| 5.0 * f64::from(k)).collect();
+    let together = stds(&times);
+    // The first pose is held to 0.1 mm; what is known of others does not depend on the company.
+    assert!(together[0] < 1.01e-4, "{together:?}");
+    assert!(
+        together[1..].iter().all(|s| (1e-4..0.02).contains(s)),
+        "{together:?}"
+    );
+    assert!((stds(&times[9..10])[0] / together[9] - 1.0).abs() < 1e-9);
     Ok(())
 }
 

@@ -19,8 +19,8 @@ from bentwing.calibrate.inspection.structure import Structure, StructureMeter
 from bentwing.calibrate.set_up import find_set_up
 from bentwing.recording.batches import EncoderBatch, ImuBatch
 from bentwing.recording.containers.source import open_source
-from bentwing.recording.preprocess import Preprocessing
 from bentwing.recording.payload import as_payload
+from bentwing.recording.preprocess import Preprocessing
 from bentwing.recording.recording import Recording
 
 if TYPE_CHECKING:

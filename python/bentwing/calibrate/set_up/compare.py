@@ -39,7 +39,9 @@ def _of_lidar(given: Payload, found: Payload) -> Iterator[Finding]:
     if given.lidar.range_scale != found.lidar.range_scale:
         scale = found.lidar.range_scale
         unit = {1.0: "metres", 1e-3: "millimetres"}.get(scale, f"units of {scale:g} m")
-        yield Finding("ranges", f"the lidar's ranges are in {unit}", f"lidar: {{range_scale: {scale:g}}}")
+        yield Finding(
+            "ranges", f"the lidar's ranges are in {unit}", f"lidar: {{range_scale: {scale:g}}}"
+        )
     if given.lidar.mirrored != found.lidar.mirrored:
         way = "against" if found.lidar.mirrored else "with"
         yield Finding(
@@ -91,7 +93,9 @@ def _of_axes(imu: Imu) -> Finding:
         hand = np.linalg.det(axes.of(imu.axes))
         which = "left-handed" if hand < 0.0 else "named otherwise"
         return Finding(
-            "axes", f"the axes of the IMU are {which}: x y z are {listed}", f"imu: {{axes: {listed}}}"
+            "axes",
+            f"the axes of the IMU are {which}: x y z are {listed}",
+            f"imu: {{axes: {listed}}}",
         )
     own = f"[{', '.join(imu.gyro_axes)}]"
     if imu.axes == ("x", "y", "z"):
@@ -110,7 +114,9 @@ def _of_encoder(given: Payload, found: Payload) -> Iterator[Finding]:
     if before.axis != after.axis:
         named = ", ".join(f"{x:.3f}" for x in after.axis)
         yield Finding(
-            "encoder", f"the motor turns about ({named}) of its frame", f"encoder: {{axis: [{named}]}}"
+            "encoder",
+            f"the motor turns about ({named}) of its frame",
+            f"encoder: {{axis: [{named}]}}",
         )
     elif abs(after.zero - before.zero) > SMALL_TURN:
         zero = after.zero

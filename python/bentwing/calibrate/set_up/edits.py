@@ -48,9 +48,7 @@ def with_encoder(payload: Payload, **changes: Any) -> Payload:  # noqa: ANN401 -
     return payload.model_copy(update={"encoder": payload.encoder.model_copy(update=changes)})
 
 
-def with_axes(
-    payload: Payload, gyro: NDArray[np.float64], accel: NDArray[np.float64]
-) -> Payload:
+def with_axes(payload: Payload, gyro: NDArray[np.float64], accel: NDArray[np.float64]) -> Payload:
     """Return the payload with axes (3, 3) of the IMU."""
     own = None if np.array_equal(gyro, accel) else axes.named(gyro)
     imu = payload.imu or Imu()
@@ -74,7 +72,9 @@ def with_rotation(payload: Payload, R: NDArray[np.float64]) -> Payload:
         turned = payload.encoder.T_imu_motor.model_copy(update={"quaternion": quat})
         return with_encoder(payload, T_imu_motor=turned)
     before = payload.T_imu_lidar or Transform()
-    return payload.model_copy(update={"T_imu_lidar": before.model_copy(update={"quaternion": quat})})
+    return payload.model_copy(
+        update={"T_imu_lidar": before.model_copy(update={"quaternion": quat})}
+    )
 
 
 def with_std(payload: Payload, **std: float) -> Payload:
@@ -96,7 +96,7 @@ def described_rotation(payload: Payload) -> NDArray[np.float64] | None:
 
 def unit_of_gyro(scale: float) -> GyroUnit | None:
     """Return the unit in which a gyro of this scale gives its rates, None if it is none."""
-    units = [unit for unit, factor in GYRO_FACTORS.items() if abs(scale * factor - 1.0) < AS_GOOD_AS_ONE]
+    units = [
+        unit for unit, factor in GYRO_FACTORS.items() if abs(scale * factor - 1.0) < AS_GOOD_AS_ONE
+    ]
     return units[0] if units else None
-
-

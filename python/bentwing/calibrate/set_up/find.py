@@ -77,9 +77,7 @@ def _found(paths: Sequence[Path], payload: Payload, threads: int | None) -> Payl
     if is_plane(points[:: max(1, len(points) // LOOKED_AT)]):
         found = describe_by_trials(stretch, start, has_mount=has_mount, threads=threads)
     else:
-        found = describe_by_motion(
-            stretch, start, imu_topic, has_mount=has_mount, threads=threads
-        )
+        found = describe_by_motion(stretch, start, imu_topic, has_mount=has_mount, threads=threads)
         found = _with_zero(start, found)
     return refined(stretch, found, has_mount=has_mount, threads=threads)
 
@@ -106,9 +104,7 @@ def _with_motor(
     return found, stretch.with_encoder(signed)
 
 
-def _joints(
-    paths: Sequence[Path], payload: Payload, stretch: Stretch
-) -> dict[Joint, EncoderBatch]:
+def _joints(paths: Sequence[Path], payload: Payload, stretch: Stretch) -> dict[Joint, EncoderBatch]:
     """Read the angles of each joint in each unit, during a stretch."""
     with Recording(paths, payload, strict=False) as recording:
         names = recording.joints
@@ -133,7 +129,11 @@ def _during(batches: list[EncoderBatch], stretch: Stretch) -> EncoderBatch:
 
 def _with_zero(start: Payload, found: Payload) -> Payload:
     """Return the payload with a turn of the motor about its own axis as the encoder's zero."""
-    if found.encoder is None or start.encoder is None or start.encoder.T_imu_motor == found.encoder.T_imu_motor:
+    if (
+        found.encoder is None
+        or start.encoder is None
+        or start.encoder.T_imu_motor == found.encoder.T_imu_motor
+    ):
         return found
     before, after = start.encoder.T_imu_motor.pose.R, found.encoder.T_imu_motor.pose.R
     turn = zero_between(before, after, np.array(found.encoder.axis))

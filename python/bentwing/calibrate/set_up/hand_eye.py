@@ -106,9 +106,7 @@ def fit_gyro(motion: LidarMotion, imu: ImuBatch, delays: Sequence[float] | None 
     )
 
 
-def fit_accel(
-    motion: LidarMotion, imu: ImuBatch, delay: float, C: NDArray[np.float64]
-) -> AccelFit:
+def fit_accel(motion: LidarMotion, imu: ImuBatch, delay: float, C: NDArray[np.float64]) -> AccelFit:
     """Fit gravity and the slope of the accelerations for axes C (3, 3)."""
     accel = Averages(imu.times, imu.accel)
     known = accel.covers(motion.times - delay, LONG_HALF)

@@ -6,8 +6,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from bentwing.base import geometry
 from bentwing.base.trajectory import DT
 from bentwing.calibrate.set_up import edits
@@ -15,6 +13,7 @@ from bentwing.odometry.continuous.estimator import Continuous
 from bentwing.recording.sections.section import Transform
 
 if TYPE_CHECKING:
+    import numpy as np
     from numpy.typing import NDArray
 
     from bentwing.base.window_record import WindowRecord

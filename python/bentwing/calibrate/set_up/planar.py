@@ -108,7 +108,10 @@ class _Trials:
         left = [(P, P) for P in tried if np.linalg.det(P) < 0.0]
         for gyro, accel in [*((P, plain) for P in tried), *((plain, P) for P in tried), *left]:
             glance = self._tried(edits.with_axes(payload, gyro, accel), CLOSE, GLANCE)
-            if glance.is_promising and (found := self._confirmed(glance.payload, glance)) is not None:
+            if (
+                glance.is_promising
+                and (found := self._confirmed(glance.payload, glance)) is not None
+            ):
                 return found
         return None
 
@@ -168,7 +171,9 @@ def _relative_axes(imu: ImuBatch) -> Iterator[NDArray[np.float64]]:
     if plain <= AS_GOOD * least or least > imu_units.EXPLAINS * windows.at_rest:
         yield np.eye(3)
         return
-    yield from (P for residual, P in sorted(rated, key=lambda r: r[0]) if residual <= AS_GOOD * least)
+    yield from (
+        P for residual, P in sorted(rated, key=lambda r: r[0]) if residual <= AS_GOOD * least
+    )
 
 
 def _own_axes(

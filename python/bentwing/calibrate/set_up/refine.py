@@ -24,9 +24,7 @@ REFINED = 12.0  # s
 CAUTION = 2.0  # what a short stretch says of a mount is less certain than it seems
 
 
-def refined(
-    stretch: Stretch, payload: Payload, *, has_mount: bool, threads: int | None
-) -> Payload:
+def refined(stretch: Stretch, payload: Payload, *, has_mount: bool, threads: int | None) -> Payload:
     """Return the payload with latency and mount as the estimator finds them, starting from it.
 
     Raises

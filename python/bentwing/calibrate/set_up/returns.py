@@ -48,7 +48,9 @@ def delays_by_returns(stretch: Stretch, imu: ImuBatch) -> list[float]:
     costs = np.array([scans.difference(first + delay, later + delay) for delay in delays])
     if np.isfinite(costs).sum() < len(costs) // 4:
         return []
-    return [float(delays[i] * scans.interval) for i in _lowest(costs, round(NEARBY / scans.interval))]
+    return [
+        float(delays[i] * scans.interval) for i in _lowest(costs, round(NEARBY / scans.interval))
+    ]
 
 
 def _lowest(costs: NDArray[np.float64], apart: int) -> list[int]:
@@ -92,7 +94,9 @@ class _Scans:
             seen = np.isfinite(apart)
             total = np.where(seen, np.minimum(apart, MOST_DIFFERENT), 0.0).sum(axis=1)
             count = seen.sum(axis=1)
-            self._differences[:-lag, lag] = np.where(count > N_BEAMS // 6, total / np.maximum(count, 1), np.nan)
+            self._differences[:-lag, lag] = np.where(
+                count > N_BEAMS // 6, total / np.maximum(count, 1), np.nan
+            )
         usual = np.where(np.isfinite(self._differences), self._differences, 0.0).sum(axis=1)
         number = np.isfinite(self._differences).sum(axis=1)
         self._usual = np.where(number > 0, usual / np.maximum(number, 1), np.nan)
@@ -110,9 +114,7 @@ class _Scans:
         return float(apart[known].mean() / usual[known].mean())
 
 
-def _pairs(
-    times: NDArray[np.float64], imu: ImuBatch
-) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _pairs(times: NDArray[np.float64], imu: ImuBatch) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return the numbers of times (S,) between which the head turned away and came back."""
     quats = _attitudes(times, imu)
     inside = np.flatnonzero((times >= imu.times[0]) & (times <= imu.times[-1]))

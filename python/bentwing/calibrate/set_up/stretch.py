@@ -118,9 +118,7 @@ def read_stretch(recording: Recording, length: float = LENGTH) -> Stretch:
     start = max(0.0, _first_motion(recording) - BEFORE_MOTION)
     thinning = _Thinning()
     batches = recording.batches(start or None, length)
-    return Stretch(
-        tuple(thinning.thinned(b) if isinstance(b, LidarBatch) else b for b in batches)
-    )
+    return Stretch(tuple(thinning.thinned(b) if isinstance(b, LidarBatch) else b for b in batches))
 
 
 def _first_motion(recording: Recording) -> float:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from bentwing.base.trajectory import Trajectory
     from bentwing.evaluate.verdict.inertial_track import InertialTrack
     from bentwing.evaluate.verdict.usual import Usual
-    from bentwing.recording.payload import Imu
+    from bentwing.recording.sections.imu import Imu
 
     Array = NDArray[np.float64]
 

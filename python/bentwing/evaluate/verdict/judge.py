@@ -96,5 +96,6 @@ def _judge_imu(imu: ImuSamples) -> list[Evidence]:
 
 def _judge_units(track: InertialTrack) -> list[Evidence]:
     """Judge by the first minute whether the samples are in m/s² and rad/s."""
-    problems = imu_units.problems(*track.samples(imu_units.CHECKED))
+    times, gyro, accel = track.samples(imu_units.CHECKED)
+    problems = imu_units.problems(times, gyro, accel)
     return [Evidence("units", 1.0, (), {"problem": problem}) for problem in problems[:1]]

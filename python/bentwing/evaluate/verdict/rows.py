@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from bentwing.base.window_record import WindowRecord
-    from bentwing.recording.payload import Imu
+    from bentwing.recording.sections.imu import Imu
 
 # Densities that any carrier has, rad/s/√Hz and m/s²/√Hz: who states less has not thought of vibration,
 # and that is no fault of the set-up.

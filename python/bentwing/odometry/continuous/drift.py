@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
 # What a window does not know of its end it shares with the next one, which sees most of the same surfaces
 # and the same fixed views: so large a share of the variance adds up. Measured with `python -m benches
-# deviations`, as are the next three.
-NEW_SHARE = 0.2
+# deviations`, as are the next four.
+NEW_SHARE = 0.15
 # Ranges are better than stated, and matches share their errors. As long as the normalized residuals are
 # below this the two make up for each other; beyond, the poses are as much worse as the residuals.
 USUAL_RESIDUAL = 0.35
@@ -27,6 +27,8 @@ USUAL_RESIDUAL = 0.35
 USUAL_DISPERSION = 0.1
 # Heading is held by the matches alone: it has all of their common errors, and a variance larger by this.
 HEADING = 2.0
+# Later windows still learn of gravity: so large a share of the variance that the last one states.
+GRAVITY = 0.5
 
 _HEADING_SCALE = np.sqrt([1.0, 1.0, HEADING, 1.0, 1.0, 1.0])
 
@@ -75,7 +77,7 @@ class Drift:
             self._times.append(leaving)
             self._left.append(at(leaving))
         variances = np.diag(result.covariance)[SLICES["gravity"]]
-        self._gravity_std = np.sqrt(inflation * np.maximum(variances, 0.0))
+        self._gravity_std = np.sqrt(GRAVITY * inflation * np.maximum(variances, 0.0))
 
     def covariances(self, trajectory: Trajectory, origin: NDArray[np.float64]) -> PoseCovariances:
         """Return those of some poses of the level `trajectory` of the pass.

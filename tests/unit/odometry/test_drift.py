@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""How the windows' covariances add up."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from bentwing.base.trajectory import Trajectory
+from bentwing.odometry.continuous import drift as module
+from bentwing.odometry.continuous.drift import Drift, inflation_of
+
+SPEED = 2.0  # m/s, along x
+SIGMAS = np.array([1e-3, 1e-3, 2e-3, 0.01, 0.01, 0.02])  # rad and m, of every window
+
+
+def window(**changed):
+    values = {
+        "gyro_rms": 0.9, "accel_rms": 1.0, "residual_rms": 0.3, "covariance": np.zeros((20, 20)),
+        "covariance_at": lambda _: np.diag(SIGMAS**2),
+        "samples": SimpleNamespace(position_at=lambda t: np.array([SPEED * t, 0.0, 0.0]), start=0.0),
+    }  # fmt: skip
+    return SimpleNamespace(**(values | changed))
+
+
+def flown(n, result):
+    """Covariances after n windows of a second."""
+    drift, times = Drift(), np.arange(0.0, n + 0.5, 0.5)
+    for k in range(n):
+        drift.add(result, float(k), k + 1.0, k + 1.0)
+    positions = np.outer(times, [SPEED, 0.0, 0.0])
+    trajectory = Trajectory(times, positions, np.tile([0.0, 0.0, 0.0, 1.0], (len(times), 1)))
+    return drift.covariances(trajectory, np.zeros(3))
+
+
+def test_a_pass_is_certain_where_it_begins():
+    found = flown(3, window())
+    assert found.times.tolist() == [0.0, 1.0, 2.0, 3.0]
+    assert np.all(found.matrices[0] == 0.0)
+
+
+def test_heading_and_position_drift_as_a_random_walk_and_tilt_does_not():
+    variances = np.einsum("kii->ki", flown(9, window()).matrices)
+    one, nine = variances[1], variances[9]
+    assert nine[2] == pytest.approx(9 * one[2])
+    assert nine[3] == pytest.approx(9 * one[3])
+    np.testing.assert_allclose(nine[:2], one[:2])
+
+
+def test_an_error_of_heading_moves_what_comes_later_sideways():
+    variances = np.einsum("kii->ki", flown(9, window()).matrices)
+    # The k-th error of heading has 9 - k more seconds to go.
+    sideways = variances[1, 2] * sum((SPEED * (9 - k)) ** 2 for k in range(1, 10))
+    assert variances[9, 4] == pytest.approx(variances[9, 3] + sideways)
+
+
+def test_doubt_about_gravity_lifts_the_far_end():
+    known = np.zeros((20, 20))
+    known[14, 14] = 1e-6  # rad², about y
+    plain, doubted = flown(4, window()), flown(4, window(covariance=known))
+    added = np.diag(doubted.matrices[-1] - plain.matrices[-1])
+    tilt = module.GRAVITY * 1e-6
+    np.testing.assert_allclose(added, [0, tilt, 0, 0, 0, tilt * (4 * SPEED) ** 2], atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("changed", "expected"),
+    [
+        ({}, 1.0),
+        ({"residual_rms": 3 * module.USUAL_RESIDUAL}, 9.0),
+        ({"gyro_rms": 5.0}, 25.0),
+        ({"gyro_rms": None, "accel_rms": None}, 1.0),
+    ],
+)
+def test_larger_residuals_than_usual_inflate_and_smaller_ones_do_not_deflate(changed, expected):
+    assert inflation_of(window(**changed)) == pytest.approx(expected)

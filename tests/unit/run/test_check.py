@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from bentwing.base.errors import BentwingError, InputError, RecordingError, UsageError
+from bentwing.base.progress import Progress
 from bentwing.calibrate.inspection import inspect
 from bentwing.recording import Payload
-from bentwing.run import pipeline, stages
+from bentwing.run import pipeline
 from bentwing.run.check import opened
 from bentwing.run.flights import map_flights
 from bentwing.run.settings import run_settings
@@ -26,7 +27,7 @@ GOOD = (
 def refusal(paths, payload):
     """What `map` says to a recording, None where it would map it."""
     try:
-        with opened(paths, run_settings(payload=payload)):
+        with opened(paths, run_settings(payload=payload), Progress()):
             return None
     except RecordingError as error:
         return str(error)
@@ -94,8 +95,8 @@ def test_force_opens_what_is_unfit(tmp_path, ros1):
     scans = [("/scan", i / 40, ros1.scan(i / 40)) for i in range(40)]
     path = ros1.write(tmp_path / "2d.bag", scans)
     assert "without IMU and encoder" in refusal(path, Payload())
-    with opened(path, run_settings(payload=Payload(), force=True)) as recording:
-        assert recording.lidar_topic == "/scan"
+    with opened(path, run_settings(payload=Payload(), force=True), Progress()) as head:
+        assert head.recording.lidar_topic == "/scan"
 
 
 @pytest.fixture
@@ -105,7 +106,7 @@ def no_estimate(monkeypatch):
     def begun(*_):
         raise AssertionError("an estimate was begun")
 
-    monkeypatch.setattr(stages, "estimate", begun)
+    monkeypatch.setattr(pipeline, "estimate", begun)
 
 
 @pytest.mark.usefixtures("no_estimate")

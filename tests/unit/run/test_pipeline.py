@@ -17,12 +17,13 @@ from bentwing.base.estimate import Estimate
 from bentwing.base.progress import Progress
 from bentwing.base.trajectory import Trajectory, read_tum
 from bentwing.calibrate.inspection import Judgement
+from bentwing.calibrate.set_up import SetUp
 from bentwing.closing.global_registration import GlobalSettings
 from bentwing.map.read import read_points
 from bentwing.map.sample import MapSample
 from bentwing.recording import Clock, ImuBatch, LidarBatch, Payload
 from bentwing.recording.described import described_mount
-from bentwing.run import check, pipeline
+from bentwing.run import head, pipeline
 from bentwing.run.found import Spin
 from bentwing.run.run import Run
 from bentwing.run.settings import RunSettings, run_settings
@@ -64,6 +65,7 @@ class FakeRecording:
 
 class FakeEstimator:
     settings = None
+    current = None
     fail_at = np.inf
 
     def __init__(self):
@@ -94,8 +96,9 @@ class FakeEstimator:
 
 @pytest.fixture
 def recording(tmp_path, monkeypatch):
-    monkeypatch.setattr(check, "Recording", FakeRecording)
-    monkeypatch.setattr(check, "judge", lambda *_, **__: Judgement([], [], None, 1.0))
+    monkeypatch.setattr(head, "Recording", FakeRecording)
+    monkeypatch.setattr(head, "judge", lambda *_, **__: Judgement([], [], None, 1.0))
+    monkeypatch.setattr(head, "find_set_up", lambda _, payload, __: SetUp(payload))
     monkeypatch.setattr(odometry, "create", lambda *_: FakeEstimator(), raising=False)
     (tmp_path / "yard.mcap").write_bytes(b"recording")
     return [tmp_path / "yard.mcap"]

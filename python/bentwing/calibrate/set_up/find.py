@@ -49,37 +49,74 @@ def find_set_up(paths: Sequence[Path], payload: Payload, threads: int | None = N
         The recording cannot be read.
     """
     try:
-        found = _found(paths, payload, threads)
+        found = _Search(paths, payload, threads).found()
     except NotFoundError as error:
         return SetUp(payload, doubt=str(error))
     return SetUp(found, findings_between(payload, found))
 
 
-def _found(paths: Sequence[Path], payload: Payload, threads: int | None) -> Payload:
-    start = edits.as_given(payload)
-    with Recording(paths, start, strict=False) as recording:
-        start = _with_clocks(recording, start)
-    with Recording(paths, start, strict=False) as recording:
-        stretch = read_stretch(recording)
-        imu_topic, encoder_topic = recording.imu_topic, recording.encoder_topic
-    points = stretch.lidar.points
-    if not len(points):
-        msg = "the lidar has no return in the part with motion: check that it was not covered"
-        raise NotFoundError(msg)
-    start = with_range_unit(start, points)
-    if imu_topic is not None:
-        start = with_imu_units(start, stretch.imu, imu_topic)
-    if encoder_topic is not None and start.encoder is not None:
-        start, stretch = _with_motor(paths, start, stretch, encoder_topic, threads)
-    if imu_topic is None:
-        return start
-    has_mount = payload.places_lidar_on_imu
-    if is_plane(points[:: max(1, len(points) // LOOKED_AT)]):
-        found = describe_by_trials(stretch, start, has_mount=has_mount, threads=threads)
-    else:
-        found = describe_by_motion(stretch, start, imu_topic, has_mount=has_mount, threads=threads)
-        found = _with_zero(start, found)
-    return refined(stretch, found, has_mount=has_mount, threads=threads)
+class _Search:
+    """Goes from what drivers give to a description of the head.
+
+    Parameters
+    ----------
+    paths, payload, threads : as of `find_set_up`
+    """
+
+    def __init__(self, paths: Sequence[Path], payload: Payload, threads: int | None) -> None:
+        self._paths, self._threads = paths, threads
+        self._has_mount = payload.places_lidar_on_imu
+        self._start = edits.as_given(payload)
+        with Recording(paths, self._start, strict=False) as recording:
+            self._start = _with_clocks(recording, self._start)
+        with Recording(paths, self._start, strict=False) as recording:
+            self._stretch = read_stretch(recording)
+            self._imu = recording.imu_topic
+            self._encoder = None if payload.encoder is None else recording.encoder_topic
+
+    def found(self) -> Payload:
+        """Return the payload with all that was found."""
+        points = self._stretch.lidar.points
+        if not len(points):
+            msg = "the lidar has no return in the part with motion: check that it was not covered"
+            raise NotFoundError(msg)
+        start = with_range_unit(self._start, points)
+        if self._imu is None:
+            return self._turned(start)[0]
+        start = with_imu_units(start, self._stretch.imu, self._imu)
+        if is_plane(points[:: max(1, len(points) // LOOKED_AT)]):
+            found, stretch = self._by_trials(start), self._stretch
+        else:
+            found, stretch = self._by_motion(start, self._imu)
+        return refined(stretch, found, has_mount=self._has_mount, threads=self._threads)
+
+    def _by_trials(self, start: Payload) -> Payload:
+        return describe_by_trials(
+            self._stretch, start, has_mount=self._has_mount, threads=self._threads
+        )
+
+    def _by_motion(self, start: Payload, imu_topic: str) -> tuple[Payload, Stretch]:
+        turned, stretch = self._turned(start)
+        found = describe_by_motion(
+            stretch, turned, imu_topic, has_mount=self._has_mount, threads=self._threads
+        )
+        if found.encoder is not None and found.lidar.mirrored and not start.lidar.mirrored:
+            # A mirrored lidar has seemed to turn the other way.
+            return self._by_motion(edits.with_lidar(start, mirrored=True), imu_topic)
+        return _with_zero(turned, found), stretch
+
+    def _turned(self, start: Payload) -> tuple[Payload, Stretch]:
+        """Return payload and stretch with the joint that turns the lidar, if one does."""
+        if self._encoder is None:
+            return start, self._stretch
+        alone = start.model_copy(update={"encoder": None})
+        motion = followed(self._stretch.read_as(alone), alone, self._threads)
+        joints = _joints(self._paths, start, self._stretch)
+        found = describe_motor(motion, joints, start, self._encoder)
+        assert found.encoder is not None
+        angles = joints[found.encoder.joint, found.encoder.unit]
+        signed = EncoderBatch(angles.times, found.encoder.sign * angles.angles)
+        return found, self._stretch.with_encoder(signed)
 
 
 def _with_clocks(recording: Recording, payload: Payload) -> Payload:
@@ -88,20 +125,6 @@ def _with_clocks(recording: Recording, payload: Payload) -> Payload:
         change = edits.with_imu if role == "imu" else edits.with_encoder
         payload = change(payload, clock_offset=offset)
     return payload
-
-
-def _with_motor(
-    paths: Sequence[Path], payload: Payload, stretch: Stretch, topic: str, threads: int | None
-) -> tuple[Payload, Stretch]:
-    """Return payload and stretch with the joint that turns the lidar."""
-    alone = payload.model_copy(update={"encoder": None})
-    motion = followed(stretch.read_as(alone), alone, threads)
-    joints = _joints(paths, payload, stretch)
-    found = describe_motor(motion, joints, payload, topic)
-    assert found.encoder is not None
-    angles = joints[found.encoder.joint, found.encoder.unit]
-    signed = EncoderBatch(angles.times, found.encoder.sign * angles.angles)
-    return found, stretch.with_encoder(signed)
 
 
 def _joints(paths: Sequence[Path], payload: Payload, stretch: Stretch) -> dict[Joint, EncoderBatch]:

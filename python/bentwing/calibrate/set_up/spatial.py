@@ -69,7 +69,7 @@ def describe_by_motion(
     if best is None:
         raise NotFoundError(_no_axes(imu_topic))
     found = edits.with_axes(found, best.gyro_axes, best.accel_axes)
-    found = edits.with_lidar(found, mirrored=best.mirrored)
+    found = edits.with_lidar(found, mirrored=payload.lidar.mirrored ^ best.mirrored)
     if described is not None and axes.angle_between(best.R_imu_lidar, described) <= AS_DESCRIBED:
         return found
     return edits.with_rotation(found, best.R_imu_lidar)

@@ -29,8 +29,6 @@ if TYPE_CHECKING:
 
     from bentwing.simulate.faults.fault import Changes, Edit
 
-_TRUTH = ("truth_trajectory.txt", "truth_scene.ply", "truth_georeference.yaml", "scenario.yaml")
-
 
 def with_fault(
     recording: Path | str, payload: Path | str, fault: str, out: Path | str, *, seed: int = 0
@@ -156,9 +154,8 @@ class _Writer:
 
 
 def _copy_truth(source: Path, out: Path, fault: str) -> None:
-    for name in _TRUTH:
-        if (source / name).exists():
-            shutil.copyfile(source / name, out / name)
-    known = source / "truth_calibration.yaml"
-    truth = yaml.safe_load(known.read_text(encoding="utf-8")) if known.exists() else {}
-    write_yaml(out / known.name, {**truth, "fault": fault})
+    for path in [*source.glob("truth_*"), *source.glob("scenario.yaml")]:
+        shutil.copyfile(path, out / path.name)
+    truth = out / "truth_calibration.yaml"
+    known = yaml.safe_load(truth.read_text(encoding="utf-8")) if truth.exists() else {}
+    write_yaml(truth, {**known, "fault": fault})

@@ -21,7 +21,7 @@ from bentwing.calibrate.set_up.trial import try_payload
 from bentwing.recording import imu_units
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -34,9 +34,10 @@ CLOSE = 0.2  # rad, std of a rotation that is described
 WIDE = 0.5  # rad, std of a rotation that is one of a cover
 UNKNOWN_LATENCY = 0.02  # s, std once it was found
 UNKNOWN_SHIFT = 0.1  # m, std where no mount is described
-# Axes that explain how gravity turns nearly as well as the best are possible.
+# The axes of the samples hold where others explain how gravity turns hardly better.
 AS_GOOD = 1.3
 SECOND_GLANCES = 8
+LIKELY_AXES = 12
 
 
 def describe_by_trials(
@@ -54,23 +55,24 @@ def describe_by_trials(
     NotFoundError
         None of the descriptions does.
     """
-    trials = _Trials(stretch, threads)
-    seen = delays_by_returns(stretch, stretch.read_as(payload).imu)
+    trials, imu = _Trials(stretch, threads), stretch.read_as(payload).imu
+    seen = delays_by_returns(stretch, imu)
     # The clocks may well agree, whatever the returns seem to say.
     delays = seen if any(abs(delay) < NEARBY for delay in seen) else [0.0, *seen]
-    relative = list(_relative_axes(stretch.read_as(payload).imu))
+    ranked = _ranked_axes(imu)
     if has_mount:
-        for delay, (gyro, accel) in itertools.product(delays, _own_axes(relative)):
-            described = edits.with_latency(edits.with_axes(payload, gyro, accel), delay)
+        for delay in delays:
+            described = edits.with_latency(payload, delay)
             if (found := trials.consistent(described, rotation=CLOSE)) is not None:
                 return found
+        likely = edits.with_latency(payload, delays[0])
+        if (found := trials.with_other_axes(likely, ranked)) is not None:
+            return found
     centre = edits.described_rotation(payload) if has_mount else None
-    for delay, gyro in itertools.product(delays, relative):
+    for gyro, delay in itertools.product(ranked[:1], delays):
         described = edits.with_latency(edits.with_axes(payload, gyro, np.eye(3)), delay)
         if (found := trials.searched(described, centre)) is not None:
             return found
-    if has_mount and (found := trials.with_other_axes(edits.with_latency(payload, delays[0]))):
-        return found
     raise NotFoundError(trials.failure)
 
 
@@ -101,17 +103,13 @@ class _Trials:
         confirmed = (self._confirmed(payload, glance) for glance in glances[:SECOND_GLANCES])
         return next((found for found in confirmed if found is not None), None)
 
-    def with_other_axes(self, payload: Payload) -> Payload | None:
-        """Look for other axes of the gyro, of the accelerometer, or of both."""
-        plain = np.eye(3)
-        tried = [P for P in axes.signed_permutations() if not np.array_equal(P, plain)]
-        left = [(P, P) for P in tried if np.linalg.det(P) < 0.0]
-        for gyro, accel in [*((P, plain) for P in tried), *((plain, P) for P in tried), *left]:
+    def with_other_axes(
+        self, payload: Payload, ranked: Sequence[NDArray[np.float64]]
+    ) -> Payload | None:
+        """Look for other axes of the gyro, of the accelerometer, or of both, the likeliest first."""
+        for gyro, accel in _own_axes(ranked[:LIKELY_AXES]):
             glance = self._tried(edits.with_axes(payload, gyro, accel), CLOSE, GLANCE)
-            if (
-                glance.is_promising
-                and (found := self._confirmed(glance.payload, glance)) is not None
-            ):
+            if glance.is_promising and (found := self._confirmed(glance.payload, glance)) is not None:
                 return found
         return None
 
@@ -162,32 +160,31 @@ def richest(imu: ImuBatch, length: float) -> tuple[float, float]:
     return start, start + length
 
 
-def _relative_axes(imu: ImuBatch) -> Iterator[NDArray[np.float64]]:
-    """Yield axes (3, 3) of the gyro, relative to the accelerometer's, that gravity's turn allows."""
+def _ranked_axes(imu: ImuBatch) -> list[NDArray[np.float64]]:
+    """Return axes (3, 3) of the gyro relative to the accelerometer's by how well they explain gravity's turn.
+
+    Those of the samples come first unless others explain it clearly better.
+    """
     windows = imu_units.GravityWindows(imu.times, imu.gyro, imu.accel)
     rated = [(windows.residual(1.0, P), P) for P in axes.signed_permutations()]
-    least = min(residual for residual, _ in rated)
-    plain = rated[0][0]
+    plain, least = rated[0][0], min(residual for residual, _ in rated)
+    ranked = [P for _, P in sorted(rated, key=lambda pair: pair[0])]
     if plain <= AS_GOOD * least or least > imu_units.EXPLAINS * windows.at_rest:
-        yield np.eye(3)
-        return
-    yield from (
-        P for residual, P in sorted(rated, key=lambda r: r[0]) if residual <= AS_GOOD * least
-    )
+        ranked.sort(key=lambda P: not np.array_equal(P, np.eye(3)))
+    return ranked
 
 
 def _own_axes(
-    relative: list[NDArray[np.float64]],
+    relative: Sequence[NDArray[np.float64]],
 ) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
     """Yield axes of gyro and accelerometer of which one sensor, or both alike, is to blame."""
     plain = np.eye(3)
     for P in relative:
+        if np.array_equal(P, plain):
+            continue
         yield P, plain
-        if not np.array_equal(P, plain):
-            yield plain, P.T
-    if any(np.linalg.det(P) < 0.0 for P in relative):
-        # Left-handed axes of the whole IMU: a rate, an axial vector, turns the other way.
-        for axis in range(3):
-            flip = np.eye(3)
-            flip[axis, axis] = -1.0
-            yield flip, flip
+        yield plain, P.T
+        if np.array_equal(P, -plain):
+            # A rate is an axial vector: on left-handed axes of the whole IMU it turns the other way.
+            left = (A for A in axes.signed_permutations() if np.linalg.det(A) < 0.0)
+            yield from ((A, A) for A in left if not np.array_equal(A, P))

@@ -12,7 +12,8 @@ use pyo3::prelude::*;
 
 use crate::arrays::to_array2;
 use crate::errors::{detached, in_pool, solve_error};
-use crate::registration::{RegistrationSettings, Surfels, global_matrix};
+use crate::registration::{RegistrationSettings, global_matrix};
+use crate::surfels::Surfels;
 use crate::trajectory::{Globals, Imu, Samples};
 
 #[derive(FromPyObject)]

@@ -18,6 +18,7 @@ mod ndt;
 mod pose_graph;
 mod raycast;
 mod registration;
+mod surfels;
 mod trajectory;
 
 /// The compiled core of bentwing.
@@ -40,7 +41,9 @@ mod _core {
     #[pymodule_export]
     use crate::raycast::Scene;
     #[pymodule_export]
-    use crate::registration::{FixedView, Registration, Surfels, extract_surfels, register_window};
+    use crate::registration::{FixedView, Registration, register_window};
+    #[pymodule_export]
+    use crate::surfels::{Surfels, extract_surfels};
     #[pymodule_export]
     use crate::trajectory::{Globals, Imu, Samples};
 

@@ -218,8 +218,8 @@ def test_an_interrupt_while_mapping_leaves_the_trajectory_and_no_half_map(
         pipeline.map_recording(recording, PAYLOAD, tmp_path / "out")
     record = record_of(tmp_path / "out")
     assert (record["stage"], record["reason"]) == ("map", "interrupted")
-    named = ["odometry.txt", "trajectory.txt", "trajectory_covariance.txt"]
-    assert record["files"] == [*named, "checkpoint.npz", "report.html"]
+    found = ["odometry.txt", "trajectory.txt", "checkpoint.npz", "trajectory_covariance.txt"]
+    assert record["files"] == [*found, "report.html"]
     assert {f.name for f in (tmp_path / "out").iterdir()} == {*record["files"], "run.json"}
 
 

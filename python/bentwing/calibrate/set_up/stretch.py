@@ -54,8 +54,9 @@ class Stretch:
 
     @property
     def lidar(self) -> LidarBatch:
-        """All points, at least one batch of them."""
-        return LidarBatch.joined([b for b in self.batches if isinstance(b, LidarBatch)])
+        """All points; none where the lidar saw nothing."""
+        parts = [b for b in self.batches if isinstance(b, LidarBatch)]
+        return LidarBatch.joined(parts) if parts else LidarBatch(np.empty((0, 3)), np.empty(0))
 
     @property
     def encoder(self) -> EncoderBatch | None:

@@ -44,7 +44,12 @@ def test_a_flight_with_one_thing_wrong_is_not_called_good(flight, tmp_path, faul
     bag, payload = flight / "recording.bag", flight / "payload.yaml"
     with_fault(bag, payload, fault, tmp_path, seed=3)
     run = map_recording(
-        tmp_path / "recording.bag", tmp_path / "payload.yaml", tmp_path / "run", map_spacing=0.1
+        tmp_path / "recording.bag",
+        tmp_path / "payload.yaml",
+        tmp_path / "run",
+        map_spacing=0.1,
+        trust_payload=True,
+        force=True,
     )
     assert run.verdict.state != "good"
     assert run.verdict.reasons[0].kind in FAULTS[fault]

@@ -39,13 +39,27 @@ def verdict(record: Mapping[str, Any]) -> str:
         headline = found.get("headline") or "Map finished"
         sentence = "" if reasons else _quality(record.get("windows") or [])
     items = "".join(f"<li>{escape(_capital(reason))}.</li>" for reason in reasons)
-    listed = f"<ul>{items}</ul>" if items else ""
+    listed = _set_up(record.get("set_up") or []) + (f"<ul>{items}</ul>" if items else "")
     if warnings:
         items = "".join(f"<li>{escape(warning)}</li>" for warning in warnings)
         listed += f"<p>Worth knowing:</p><ul>{items}</ul>"
     listed += "".join(f"<p>Note: {escape(str(note))}.</p>" for note in record.get("notes") or [])
     said = f"<p>{escape(sentence)}</p>" if sentence else ""
     return f'<div class="verdict {level}"><strong>{escape(headline)}</strong>{said}{listed}</div>'
+
+
+def _set_up(findings: Sequence[Mapping[str, Any]]) -> str:
+    """Say in what the head is other than the payload says."""
+    if not findings:
+        return ""
+    items = "".join(
+        f"<li>{escape(_capital(f['sentence']))}: <code>{escape(f['line'])}</code></li>"
+        for f in findings
+    )
+    return (
+        "<p>The recording shows another sensor head than the payload describes, and was mapped with it. "
+        f"Correct payload.yaml:</p><ul>{items}</ul>"
+    )
 
 
 def _capital(sentence: str) -> str:

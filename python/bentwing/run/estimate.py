@@ -7,8 +7,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from bentwing import odometry
-from bentwing.base.errors import RecordingError
-from bentwing.run.first_pass import FirstPass
+from bentwing.base.errors import EstimationError, RecordingError
+from bentwing.run.first_pass import FirstPass, blames_head
 from bentwing.run.head import ALL_THE_SAME
 
 if TYPE_CHECKING:
@@ -17,23 +17,6 @@ if TYPE_CHECKING:
     from bentwing.run.found import Found
     from bentwing.run.head import Head
     from bentwing.run.stages import Job
-
-# Reasons that another set-up of the head may explain.
-_OF_HEAD = frozenset(
-    {
-        "matches",
-        "lost",
-        "loop",
-        "gravity",
-        "gyro",
-        "accelerometer",
-        "calibration",
-        "units",
-        "speed",
-        "slice",
-    }
-)
-_RANK = ("good", "doubtful", "failed")
 
 
 def estimate(job: Job, found: Found, head: Head) -> tuple[Job, Found]:
@@ -54,13 +37,12 @@ def estimate(job: Job, found: Found, head: Head) -> tuple[Job, Found]:
     """
     may_repair = head.set_up is None and not (job.settings.trust_payload or job.settings.force)
     first = _first_pass(job, replace(found, set_up=head.set_up), may_stop=may_repair)
-    verdict = first.doubt or first.verdict
-    if not may_repair or first.failure is not None or not _blames_head(verdict):
+    if not may_repair or not _is_doubted(first):
         return job, first
     shown = head.found()
     if shown.doubt is not None:
         if first.doubt is not None:
-            raise RecordingError(_refusal(verdict, shown))
+            raise RecordingError(_refusal(first.doubt, shown))
         return job, first
     if shown.findings:
         head.use(shown)
@@ -79,8 +61,11 @@ def _first_pass(job: Job, found: Found, *, may_stop: bool) -> Found:
     return FirstPass(job, engine, may_stop=may_stop).run(found)
 
 
-def _blames_head(verdict: Verdict) -> bool:
-    return any(reason.kind in _OF_HEAD for reason in verdict.reasons)
+def _is_doubted(first: Found) -> bool:
+    """Whether another set-up of the head may explain why an estimate is not good."""
+    if first.failure is not None:
+        return isinstance(first.failure, EstimationError)
+    return blames_head(first.doubt or first.verdict)
 
 
 def _refusal(verdict: Verdict, shown: SetUp) -> str:

@@ -24,6 +24,30 @@ if TYPE_CHECKING:
 # How often the beginning of an estimate is judged, s, and until when: later its set-up is known to be
 # right.
 _INTERVAL, _UNTIL = 2.0, 60.0
+# Reasons that another set-up of the head may explain, and those that no set-up does.
+_OF_HEAD = frozenset(
+    (
+        "matches",
+        "lost",
+        "gravity",
+        "gyro",
+        "accelerometer",
+        "calibration",
+        "units",
+        "speed",
+        "slice",
+    )
+)
+_OF_SAMPLES = frozenset(
+    ("constant", "repeated", "gyro_limit", "accelerometer_limit", "even_ranges", "scatter")
+)
+
+
+def blames_head(verdict: Verdict) -> bool:
+    """Whether another set-up of the head may explain why an estimate is not good."""
+    kinds = {reason.kind for reason in verdict.reasons}
+    failed = {reason.kind for reason in verdict.reasons if reason.state == "failed"}
+    return bool(kinds & _OF_HEAD) and not failed & _OF_SAMPLES
 
 
 class FirstPass:
@@ -32,7 +56,7 @@ class FirstPass:
     Parameters
     ----------
     engine : that estimates
-    may_stop : whether to stop as soon as the estimate is certainly wrong
+    may_stop : whether to stop as soon as the estimate is certainly wrong and the head may be to blame
     """
 
     def __init__(self, job: Job, engine: Estimator, *, may_stop: bool) -> None:
@@ -85,7 +109,7 @@ class FirstPass:
         known = self._engine.current
         estimate = None if known is None else known.estimate()
         verdict = judge_so_far(estimate, self._job.part.payload, self._watch)
-        return verdict if verdict.state == "failed" else None
+        return verdict if verdict.state == "failed" and blames_head(verdict) else None
 
     def _so_far(self, error: BaseException | None = None) -> Estimate | None:
         # There may be nothing yet, and an interrupt may find a step half done.

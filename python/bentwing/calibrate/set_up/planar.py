@@ -37,7 +37,6 @@ UNKNOWN_SHIFT = 0.1  # m, std where no mount is described
 # The axes of the samples hold where others explain how gravity turns hardly better.
 AS_GOOD = 1.3
 SECOND_GLANCES = 8
-LIKELY_AXES = 12
 
 
 def describe_by_trials(
@@ -107,9 +106,12 @@ class _Trials:
         self, payload: Payload, ranked: Sequence[NDArray[np.float64]]
     ) -> Payload | None:
         """Look for other axes of the gyro, of the accelerometer, or of both, the likeliest first."""
-        for gyro, accel in _own_axes(ranked[:LIKELY_AXES]):
+        for gyro, accel in _own_axes(ranked):
             glance = self._tried(edits.with_axes(payload, gyro, accel), CLOSE, GLANCE)
-            if glance.is_promising and (found := self._confirmed(glance.payload, glance)) is not None:
+            if (
+                glance.is_promising
+                and (found := self._confirmed(glance.payload, glance)) is not None
+            ):
                 return found
         return None
 
@@ -161,17 +163,21 @@ def richest(imu: ImuBatch, length: float) -> tuple[float, float]:
 
 
 def _ranked_axes(imu: ImuBatch) -> list[NDArray[np.float64]]:
-    """Return axes (3, 3) of the gyro relative to the accelerometer's by how well they explain gravity's turn.
+    """Return axes (3, 3) of the gyro relative to the accelerometer's, the likeliest first.
 
-    Those of the samples come first unless others explain it clearly better.
+    Where gravity turns enough in the samples it ranks them, else the fewer mistakes the likelier.
     """
     windows = imu_units.GravityWindows(imu.times, imu.gyro, imu.accel)
     rated = [(windows.residual(1.0, P), P) for P in axes.signed_permutations()]
     plain, least = rated[0][0], min(residual for residual, _ in rated)
-    ranked = [P for _, P in sorted(rated, key=lambda pair: pair[0])]
     if plain <= AS_GOOD * least or least > imu_units.EXPLAINS * windows.at_rest:
-        ranked.sort(key=lambda P: not np.array_equal(P, np.eye(3)))
-    return ranked
+        return sorted((P for _, P in rated), key=_n_mistakes)
+    return [P for _, P in sorted(rated, key=lambda pair: pair[0])]
+
+
+def _n_mistakes(P: NDArray[np.float64]) -> int:
+    """Return how many axes are other than those of the samples; all negated are one mistake."""
+    return min(int((np.diag(P) != 1.0).sum()), 1 + int((np.diag(P) != -1.0).sum()))
 
 
 def _own_axes(
@@ -180,11 +186,8 @@ def _own_axes(
     """Yield axes of gyro and accelerometer of which one sensor, or both alike, is to blame."""
     plain = np.eye(3)
     for P in relative:
-        if np.array_equal(P, plain):
-            continue
-        yield P, plain
-        yield plain, P.T
-        if np.array_equal(P, -plain):
-            # A rate is an axial vector: on left-handed axes of the whole IMU it turns the other way.
-            left = (A for A in axes.signed_permutations() if np.linalg.det(A) < 0.0)
-            yield from ((A, A) for A in left if not np.array_equal(A, P))
+        if not np.array_equal(P, plain):
+            yield P, plain
+            yield plain, P.T
+        if np.linalg.det(P) < 0.0:
+            yield P, P  # left-handed axes of the whole IMU

@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""Whether the set-up of a head is found: good flights, and the same with one thing wrong."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bentwing.base import geometry
+from bentwing.calibrate.draft import draft_payload
+from bentwing.calibrate.set_up import find_set_up
+from bentwing.evaluate.simulated import score
+from bentwing.recording import Payload
+from bentwing.run.pipeline import map_recording
+from bentwing.simulate.faults import with_fault
+
+HEADS = ("hokuyo-spin", "hokuyo-nod", "vlp16-fixed", "vlp16-motor")
+FAULTS = {
+    "mount-90-y": "mount",
+    "mount-random": "mount",
+    "gyro-one-negated": "axes",
+    "gyro-negated": "axes",
+    "accel-cyclic": "axes",
+    "imu-left-handed": "axes",
+    "gyro-degrees": "units",
+    "accel-g": "units",
+    "ranges-millimetres": "ranges",
+    "lidar-late-0.5": "latency",
+    "lidar-early-1": "latency",
+    "imu-power-on": "clock",
+    "lidar-mirrored": "mirrored",
+}
+ENCODER = ("encoder-degrees", "encoder-negated", "encoder-turned", "encoder-axis", "encoder-second")
+
+
+@pytest.fixture
+def faulted(simulated, tmp_path):
+    """Return a maker of a flight with one thing wrong: recording and payload."""
+
+    def make(head, fault):
+        folder = simulated("office", 22.0, head=head)
+        return with_fault(
+            folder / "recording.bag", folder / "payload.yaml", fault, tmp_path, seed=3
+        )
+
+    return make
+
+
+@pytest.mark.parametrize("head", HEADS)
+def test_a_head_that_is_as_described_stays_so(simulated, head):
+    folder = simulated("office", 22.0, head=head)
+    found = find_set_up([folder / "recording.bag"], Payload.load(folder / "payload.yaml"))
+    assert (found.doubt, found.findings) == (None, ())
+
+
+@pytest.mark.parametrize(
+    ("head", "fault"),
+    [
+        ("vlp16-fixed", "mount-90-y"),
+        ("hokuyo-spin", "lidar-early-1"),
+        *(
+            pytest.param(head, fault, marks=pytest.mark.slow)
+            for head in HEADS
+            for fault in FAULTS
+            # What a 2D lidar sees in a mirror, it sees from the other side of its plane.
+            if not (fault == "lidar-mirrored" and head.startswith("hokuyo"))
+        ),
+        *(pytest.param("vlp16-motor", fault, marks=pytest.mark.slow) for fault in ENCODER),
+    ],
+)
+def test_what_is_wrong_is_found_and_named(faulted, head, fault):
+    recording, payload = faulted(head, fault)
+    found = find_set_up([recording], Payload.load(payload))
+    assert found.doubt is None
+    assert FAULTS.get(fault, "encoder") in {finding.kind for finding in found.findings}
+
+
+@pytest.mark.parametrize("fault", ["gyro-zero", "accel-no-gravity", "gyro-1.2"])
+def test_what_cannot_be_put_right_is_named(faulted, fault):
+    recording, payload = faulted("vlp16-fixed", fault)
+    doubt = find_set_up([recording], Payload.load(payload)).doubt
+    words = {"gyro-zero": "gyro shows the same", "accel-no-gravity": "gravity", "gyro-1.2": "1.2"}
+    assert words[fault] in doubt
+
+
+@pytest.mark.parametrize(
+    "head",
+    ["vlp16-fixed", *(pytest.param(head, marks=pytest.mark.slow) for head in HEADS[:2])],
+)
+def test_no_payload_is_needed(simulated, tmp_path, head):
+    folder = simulated("office", 22.0, head=head)
+    run = map_recording(folder / "recording.bag", None, tmp_path / "run", map_spacing=0.05)
+    assert run.verdict.state == "good"
+    true = Payload.load(folder / "payload.yaml").T_imu_lidar.pose
+    turn = geometry.multiply(
+        geometry.inverse(true.quaternion), run.calibration.mount.T_imu_lidar.quaternion
+    )
+    assert np.degrees(np.linalg.norm(geometry.log(turn[None]))) < 1.5
+    assert score(folder, tmp_path / "run").ate < 0.02
+
+
+def test_a_draft_knows_no_mount(simulated):
+    folder = simulated("office", 22.0, head="vlp16-fixed")
+    assert not draft_payload(folder / "recording.bag").payload.places_lidar_on_imu

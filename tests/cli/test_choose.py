@@ -13,6 +13,7 @@ from bentwing.odometry import ESTIMATORS
 from bentwing.recording import Payload
 from bentwing.run import pipeline
 from bentwing.run.choose import changes_of, choose, merged
+from bentwing.run.found import Found
 from bentwing.run.settings import RunSettings
 
 HEAD = """
@@ -46,7 +47,12 @@ def written(tmp_path):
 def called(monkeypatch):
     """Stand in for the pipeline; the list receives the arguments of each call."""
     calls = []
-    monkeypatch.setattr(pipeline, "run_recording", lambda *a, **o: calls.append((a, o)))
+
+    def record(*arguments, **options):
+        calls.append((arguments, options))
+        return Found()
+
+    monkeypatch.setattr(pipeline, "run_recording", record)
     return calls
 
 

@@ -14,6 +14,7 @@ from bentwing.closing import GeoreferenceSettings
 from bentwing.map.clean import CleanSettings
 from bentwing.recording import Payload
 from bentwing.run import pipeline
+from bentwing.run.found import Found
 from bentwing.run.settings import RunSettings, run_settings
 
 BENTWING = "from bentwing.cli.main import run; run()"
@@ -26,6 +27,7 @@ def called(monkeypatch):
 
     def record(*arguments, **options):
         calls.append((arguments, options))
+        return Found()
 
     monkeypatch.setattr(pipeline, "run_recording", record)
     return calls

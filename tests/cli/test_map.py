@@ -264,9 +264,15 @@ def test_an_impossible_transform(refuse, office, changed_payload, wrong, part):
     )
 
 
-def test_an_imu_without_its_place(refuse, office, changed_payload):
+def test_an_imu_without_its_place_must_be_placed_where_the_payload_is_to_be_trusted(
+    refuse, office, changed_payload
+):
     refuse(
-        office / "recording.bag", "/imu", "T_imu_lidar", payload=changed_payload(T_imu_lidar=None)
+        office / "recording.bag",
+        "/imu",
+        "T_imu_lidar",
+        payload=changed_payload(T_imu_lidar=None),
+        options=("--trust-payload",),
     )
 
 
@@ -278,6 +284,7 @@ def test_a_mount_that_lays_the_scan_plane_level_is_doubted(refuse, office, chang
         "stays level",
         "correct T_imu_lidar",
         payload=changed_payload(T_imu_lidar=level),
+        options=("--trust-payload",),
     )
 
 

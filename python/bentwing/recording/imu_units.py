@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 CHECKED = 60.0  # s of the recording's beginning; more would not change the judgement
 MIN_SAMPLES = 20
-QUIET, NO_GRAVITY = 1.0, 0.25  # s; m/s² or g
+QUIET, NO_GRAVITY = 1.0, 0.5  # s; of the median length
 MAX_RATE = 35.0  # rad/s, full scale of the fastest common gyros
 PLAIN_ACCEL = (9.3, 10.3)  # m/s², median length of an IMU that does not swing
 # m/s², median length; 0.3 m off the axis of a spin of 15 rad/s it is seven times gravity.
@@ -105,16 +105,17 @@ def accel_unit(accel: NDArray[np.float64]) -> AccelUnit | None:
 
 
 def lacks_gravity(times: NDArray[np.float64], accel: NDArray[np.float64]) -> bool:
-    """Whether the driver has taken gravity off accelerations (M, 3), m/s² or g.
+    """Whether the driver has taken gravity off accelerations (M, 3).
 
-    In either unit an accelerometer shows about one and more at its quietest, without gravity nothing.
+    In any unit an accelerometer shows gravity at its quietest as well; without it nearly nothing.
     """
     n = max(1, int(QUIET / max(float(np.median(np.diff(times))), 1e-6)))
-    if len(accel) < n:
+    lengths = np.linalg.norm(accel, axis=1)
+    usual = float(np.median(lengths)) if len(lengths) else 0.0
+    if len(lengths) < n or not 0.0 < usual < ACCEL_RANGE[0]:
         return False
-    totals = np.vstack([np.zeros(3), np.cumsum(accel, axis=0)])
-    means = np.linalg.norm(totals[n:] - totals[:-n], axis=1) / n
-    return bool(np.median(np.linalg.norm(accel, axis=1)) > 0.0 and means.min() < NO_GRAVITY)
+    totals = np.concatenate([[0.0], np.cumsum(lengths)])
+    return bool((totals[n:] - totals[:-n]).min() / n < NO_GRAVITY * usual)
 
 
 def gyro_scale(

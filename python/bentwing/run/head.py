@@ -87,7 +87,7 @@ class Head:
         if self.settings.force:
             return
         defects = judge(self.recording, has_payload=True).defects
-        if defects and not self.settings.trust_payload:
+        if defects and not self.settings.trust_payload and self._moves:
             found = self.found()
             if found.doubt is not None:
                 msg = (
@@ -116,6 +116,11 @@ class Head:
         self.recording = Recording(self.paths, self.settings.payload, strict=False)
         for finding in set_up.findings:
             self._progress.note(f"set-up: {finding.sentence} ({finding.line})")
+
+    @property
+    def _moves(self) -> bool:
+        recording = self.recording
+        return recording.imu_topic is not None or recording.encoder_topic is not None
 
     @property
     def _lacks_mount(self) -> bool:

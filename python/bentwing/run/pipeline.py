@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from bentwing import odometry
 from bentwing.base.progress import as_progress
 from bentwing.closing.localize import read_prior_map
 from bentwing.run import stages
@@ -125,6 +126,8 @@ def run_recording(
     What the stages have found; `Run.of` makes a run of it.
     """
     watch = as_progress(progress)
+    # Refuses at once what the estimator cannot do.
+    odometry.create(settings.estimator, settings.payload, settings.of_estimator, settings.threads)
     with (
         opened(paths, settings, watch) as head,
         RunFolder(Path(out), settings.to_json()) as folder,

@@ -10,7 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from bentwing.calibrate.set_up.hand_eye import fit_accel, fit_gyro
-from bentwing.calibrate.set_up.motion import LidarMotion
+from bentwing.calibrate.set_up.motion import LONG_HALF, LidarMotion
 from bentwing.recording import ImuBatch
 
 GRAVITY = np.array([0.0, 0.0, 9.81])
@@ -27,6 +27,17 @@ def acceleration(t: np.ndarray) -> np.ndarray:
     return np.stack([1.5 * np.sin(1.7 * t), 1.2 * np.cos(1.1 * t), 0.8 * np.sin(2.3 * t)], axis=-1)
 
 
+def seen_acceleration(t: np.ndarray) -> np.ndarray:
+    """Return what the second differences of the positions are."""
+    size = [
+        1.5 * np.sin(1.7 * t) / 1.7**2,
+        1.2 * np.cos(1.1 * t) / 1.1**2,
+        0.8 * np.sin(2.3 * t) / 2.3**2,
+    ]
+    bends = [4 * np.sin(w * LONG_HALF / 2) ** 2 / LONG_HALF**2 for w in (1.7, 1.1, 2.3)]
+    return np.stack(size, axis=-1) * bends
+
+
 def rates(t: np.ndarray) -> np.ndarray:
     turn = attitude(t - STEP).inv() * attitude(t + STEP)
     return turn.as_rotvec() / (2 * STEP)
@@ -35,7 +46,7 @@ def rates(t: np.ndarray) -> np.ndarray:
 @pytest.fixture(scope="module")
 def motion() -> LidarMotion:
     t = np.arange(0.0, 16.0, 0.01)
-    return LidarMotion(t, attitude(t).as_matrix(), rates(t), acceleration(t), ())
+    return LidarMotion(t, attitude(t).as_matrix(), rates(t), seen_acceleration(t), ())
 
 
 @pytest.fixture(scope="module")

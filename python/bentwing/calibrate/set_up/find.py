@@ -52,7 +52,8 @@ def find_set_up(paths: Sequence[Path], payload: Payload, threads: int | None = N
         found = _Search(paths, payload, threads).found()
     except NotFoundError as error:
         return SetUp(payload, doubt=str(error))
-    return SetUp(found, findings_between(payload, found))
+    findings = findings_between(payload, found)
+    return SetUp(found if findings else payload, findings)
 
 
 class _Search:

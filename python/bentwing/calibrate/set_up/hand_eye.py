@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing.calibrate.set_up.motion import HALF, LONG_HALF
-from bentwing.calibrate.set_up.signals import Averages
+from bentwing.calibrate.set_up.motion import HALF
+from bentwing.calibrate.set_up.signals import HIDDEN, Averages, smoothed
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 LARGEST_DELAY = 5.0  # s
 COARSE, FINE = 0.02, 0.001  # s
 LEAST_OVERLAP = 5.0  # s
+SHORT_HALF = 0.01  # s, of the forces before they are smoothed
 # Without this much turn about a third axis nothing tells whether the readings are mirrored.
 LEAST_THIRD = 0.03  # rad/s
 
@@ -109,10 +110,11 @@ def fit_gyro(motion: LidarMotion, imu: ImuBatch, delays: Sequence[float] | None 
 def fit_accel(motion: LidarMotion, imu: ImuBatch, delay: float, C: NDArray[np.float64]) -> AccelFit:
     """Fit gravity and the slope of the accelerations for axes C (3, 3)."""
     accel = Averages(imu.times, imu.accel)
-    known = accel.covers(motion.times - delay, LONG_HALF)
-    times, R, acceleration = motion.times[known], motion.R[known], motion.accelerations[known]
-    force = accel.under_triangles(times - delay, LONG_HALF)
-    in_map = np.einsum("nij,nj->ni", R, force @ C)
+    known = accel.covers(motion.times - delay, SHORT_HALF)
+    force = accel.about(motion.times[known] - delay, SHORT_HALF)
+    # In the map before it is smoothed: the head turns meanwhile.
+    in_map = smoothed(np.einsum("nij,nj->ni", motion.R[known], force @ C))
+    acceleration = motion.accelerations[known][HIDDEN : len(force) - HIDDEN]
     gravity, slope = in_map.mean(axis=0), 1.0
     varied = acceleration - acceleration.mean(axis=0)
     if (power := float((varied**2).sum())) > 0.0:

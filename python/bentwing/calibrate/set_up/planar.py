@@ -7,7 +7,6 @@ axes and delay do the surfaces of its turns agree.
 
 from __future__ import annotations
 
-import itertools
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -30,6 +29,9 @@ if TYPE_CHECKING:
     from bentwing.recording import ImuBatch, Payload
 
 TRIED, GLANCE = 6.0, 2.5  # s of the richest motion on which descriptions are tried, and first seen
+LONG_GLANCE = 4.5  # s, of a head that turns little
+# Rotations in the middle between those of a cover.
+ASIDE = Rotation.from_rotvec(np.radians(36.0) * np.array([0.0, 0.6, 0.8]))
 CLOSE = 0.2  # rad, std of a rotation that is described
 WIDE = 0.5  # rad, std of a rotation that is one of a cover
 UNKNOWN_LATENCY = 0.02  # s, std once it was found
@@ -37,6 +39,8 @@ UNKNOWN_SHIFT = 0.1  # m, std where no mount is described
 # The axes of the samples hold where others explain how gravity turns hardly better.
 AS_GOOD = 1.3
 SECOND_GLANCES = 8
+# Where the noise of the accelerometer is as stated its residuals are no larger, in units of it.
+AS_STATED = 2.0
 
 
 def describe_by_trials(
@@ -68,9 +72,11 @@ def describe_by_trials(
         if (found := trials.with_other_axes(likely, ranked)) is not None:
             return found
     centre = edits.described_rotation(payload) if has_mount else None
-    for gyro, delay in itertools.product(ranked[:1], delays):
-        described = edits.with_latency(edits.with_axes(payload, gyro, np.eye(3)), delay)
-        if (found := trials.searched(described, centre)) is not None:
+    # A head that nods in time with itself agrees with other delays as well: only the best is tried.
+    described = edits.with_axes(edits.with_latency(payload, delays[0]), ranked[0], np.eye(3))
+    for length, aside in ((GLANCE, Rotation.identity()), (LONG_GLANCE, ASIDE)):
+        middle = Rotation.identity() if centre is None else Rotation.from_matrix(centre)
+        if (found := trials.searched(described, middle * aside, length)) is not None:
             return found
     raise NotFoundError(trials.failure)
 
@@ -87,13 +93,12 @@ class _Trials:
         trial = self._tried(payload, rotation, TRIED)
         return _learned(payload, trial) if trial.is_consistent else None
 
-    def searched(self, payload: Payload, centre: NDArray[np.float64] | None) -> Payload | None:
-        """Look for the rotation of the lidar anywhere, nearest to `centre` first."""
-        middle = Rotation.identity() if centre is None else Rotation.from_matrix(centre)
+    def searched(self, payload: Payload, centre: Rotation, length: float) -> Payload | None:
+        """Look for the rotation of the lidar anywhere, nearest to `centre` first, by glances of a length, s."""
         glances = []
-        for rotation in cover(middle):
+        for rotation in cover(centre):
             turned = edits.with_rotation(payload, rotation.as_matrix())
-            glance = self._tried(turned, WIDE, GLANCE)
+            glance = self._tried(turned, WIDE, length)
             if glance.is_promising and (found := self._confirmed(payload, glance)) is not None:
                 return found
             glances.append(glance)
@@ -105,22 +110,32 @@ class _Trials:
     def with_other_axes(
         self, payload: Payload, ranked: Sequence[NDArray[np.float64]]
     ) -> Payload | None:
-        """Look for other axes of the gyro, of the accelerometer, or of both, the likeliest first."""
-        for gyro, accel in _own_axes(ranked):
-            glance = self._tried(edits.with_axes(payload, gyro, accel), CLOSE, GLANCE)
-            if (
-                glance.is_promising
-                and (found := self._confirmed(glance.payload, glance)) is not None
-            ):
-                return found
+        """Look for other axes of the gyro or of the accelerometer, then of both."""
+        for group in (_of_one_sensor(ranked), _of_both_sensors(ranked)):
+            trials = []
+            for gyro, accel in group:
+                described = edits.with_axes(payload, gyro, accel)
+                glance = self._tried(described, CLOSE, GLANCE)
+                trial = self._again(described, glance) if glance.is_promising else glance
+                if trial.is_consistent and trial.accel_rms <= AS_STATED:
+                    return _learned(described, trial)
+                trials += [trial] if trial.is_consistent else []
+            if trials:
+                # In a mirrored world the surfaces agree as well, but not the forces.
+                best = min(trials, key=lambda trial: trial.accel_rms)
+                return _learned(best.payload, best)
         return None
 
     def _confirmed(self, payload: Payload, glance: Trial) -> Payload | None:
         """Return what a glance has learned if all fits together with it."""
+        trial = self._again(payload, glance)
+        return _learned(payload, trial) if trial.is_consistent else None
+
+    def _again(self, payload: Payload, glance: Trial) -> Trial:
+        """Try what a glance has learned; what it saw first was blurred by where it came from."""
         if glance.calibration is None:
-            return None
-        # What it saw first was blurred by where it came from.
-        return self.consistent(_learned(payload, glance), rotation=CLOSE)
+            return glance
+        return self._tried(_learned(payload, glance), CLOSE, TRIED)
 
     @property
     def failure(self) -> str:
@@ -180,14 +195,19 @@ def _n_mistakes(P: NDArray[np.float64]) -> int:
     return min(int((np.diag(P) != 1.0).sum()), 1 + int((np.diag(P) != -1.0).sum()))
 
 
-def _own_axes(
+def _of_one_sensor(
     relative: Sequence[NDArray[np.float64]],
 ) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
-    """Yield axes of gyro and accelerometer of which one sensor, or both alike, is to blame."""
+    """Yield axes of gyro and accelerometer of which one is to blame."""
     plain = np.eye(3)
     for P in relative:
         if not np.array_equal(P, plain):
             yield P, plain
             yield plain, P.T
-        if np.linalg.det(P) < 0.0:
-            yield P, P  # left-handed axes of the whole IMU
+
+
+def _of_both_sensors(
+    relative: Sequence[NDArray[np.float64]],
+) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+    """Yield left-handed axes of the whole IMU; right-handed ones are another mount."""
+    return ((P, P) for P in relative if np.linalg.det(P) < 0.0)

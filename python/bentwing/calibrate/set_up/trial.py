@@ -48,6 +48,12 @@ class Trial:
         return self.last.n_matches * (2.0 * self.last.inlier_share - 1.0)
 
     @property
+    def accel_rms(self) -> float:
+        """Residuals of the accelerometer in units of its stated noise; infinite where they are unknown."""
+        known = None if self.last is None else self.last.accel_rms
+        return float("inf") if known is None else known
+
+    @property
     def is_promising(self) -> bool:
         """Whether most of what was seen fits together."""
         last = self.last

@@ -46,7 +46,9 @@ def faulted(simulated, tmp_path):
     return make
 
 
-@pytest.mark.parametrize("head", HEADS)
+@pytest.mark.parametrize(
+    "head", ["hokuyo-spin", *(pytest.param(head, marks=pytest.mark.slow) for head in HEADS[1:])]
+)
 def test_a_head_that_is_as_described_stays_so(simulated, head):
     folder = simulated("office", 22.0, head=head)
     found = find_set_up([folder / "recording.bag"], Payload.load(folder / "payload.yaml"))
@@ -79,21 +81,25 @@ def test_what_is_wrong_is_found_and_named(faulted, head, fault):
 def test_what_cannot_be_put_right_is_named(faulted, fault):
     recording, payload = faulted("vlp16-fixed", fault)
     doubt = find_set_up([recording], Payload.load(payload)).doubt
-    words = {"gyro-zero": "gyro shows the same", "accel-no-gravity": "gravity", "gyro-1.2": "1.2"}
+    words = {
+        "gyro-zero": "gyro shows the same",
+        "accel-no-gravity": "gravity",
+        "gyro-1.2": "times the turn that the lidar sees",
+    }
     assert words[fault] in doubt
 
 
 @pytest.mark.parametrize(
     "head",
-    ["vlp16-fixed", *(pytest.param(head, marks=pytest.mark.slow) for head in HEADS[:2])],
+    ["hokuyo-spin", *(pytest.param(head, marks=pytest.mark.slow) for head in HEADS[1:3])],
 )
 def test_no_payload_is_needed(simulated, tmp_path, head):
     folder = simulated("office", 22.0, head=head)
     run = map_recording(folder / "recording.bag", None, tmp_path / "run", map_spacing=0.05)
-    assert run.verdict.state == "good"
+    assert run.verdict.state != "failed"
     true = Payload.load(folder / "payload.yaml").T_imu_lidar.pose
     turn = geometry.multiply(
-        geometry.inverse(true.quaternion), run.calibration.mount.T_imu_lidar.quaternion
+        geometry.inverse(true.quaternion), run.estimate.calibration.mount.T_imu_lidar.quaternion
     )
     assert np.degrees(np.linalg.norm(geometry.log(turn[None]))) < 1.5
     assert score(folder, tmp_path / "run").ate < 0.02

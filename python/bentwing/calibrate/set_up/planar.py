@@ -7,6 +7,7 @@ axes and delay do the surfaces of its turns agree.
 
 from __future__ import annotations
 
+import itertools
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -32,6 +33,7 @@ TRIED, GLANCE = 6.0, 2.5  # s of the richest motion on which descriptions are tr
 LONG_GLANCE = 4.5  # s, of a head that turns little
 # Rotations in the middle between those of a cover.
 ASIDE = Rotation.from_rotvec(np.radians(36.0) * np.array([0.0, 0.6, 0.8]))
+AS_DESCRIBED = 0.02  # rad, std of a rotation that may hold
 CLOSE = 0.2  # rad, std of a rotation that is described
 WIDE = 0.5  # rad, std of a rotation that is one of a cover
 UNKNOWN_LATENCY = 0.02  # s, std once it was found
@@ -64,9 +66,9 @@ def describe_by_trials(
     delays = seen if any(abs(delay) < NEARBY for delay in seen) else [0.0, *seen]
     ranked = _ranked_axes(imu)
     if has_mount:
-        for delay in delays:
+        for delay, rotation in itertools.product(delays, (AS_DESCRIBED, CLOSE)):
             described = edits.with_latency(payload, delay)
-            if (found := trials.consistent(described, rotation=CLOSE)) is not None:
+            if (found := trials.consistent(described, rotation=rotation)) is not None:
                 return found
         likely = edits.with_latency(payload, delays[0])
         if (found := trials.with_other_axes(likely, ranked)) is not None:
@@ -146,7 +148,7 @@ class _Trials:
         wide = edits.with_std(
             payload,
             extrinsic_rotation=rotation,
-            extrinsic_translation=UNKNOWN_SHIFT,
+            extrinsic_translation=UNKNOWN_SHIFT if rotation > AS_DESCRIBED else 0.0,
             latency=UNKNOWN_LATENCY,
         )
         read = self._stretch.read_as(wide)

@@ -16,13 +16,12 @@ if TYPE_CHECKING:
     from bentwing.calibrate.set_up.stretch import Stretch
     from bentwing.recording import Payload
 
-# Of a right description 0.97 of the matches and more agree, with 0.2 to 0.45 of the expected noise;
-# of a wrong one at most 0.9, with 0.65 and more.
+# Of a right description 0.97 of the matches and more agree, of a wrong one at most 0.92.
 # In a glance a right description is a little blurred by where it came from.
 PROMISING = 0.88
 # A wrong description never settles; a right one does soon.
 SETTINGS = ContinuousSettings(registration=RegistrationSettings(max_outer=8))
-LEAST_INLIERS, MOST_RESIDUAL, FEWEST_MATCHES = 0.95, 0.55, 150
+LEAST_INLIERS, MOST_RESIDUAL, FEWEST_MATCHES = 0.95, 0.7, 150
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +44,12 @@ class Trial:
         """Matches that agree, less those that do not."""
         if self.last is None or self.last.inlier_share is None:
             return 0.0
-        return self.last.n_matches * (2.0 * self.last.inlier_share - 1.0)
+        return self.n_matches * (2.0 * self.last.inlier_share - 1.0)
+
+    @property
+    def n_matches(self) -> int:
+        """Pairs of surfaces in the last window, those with what it saw before included."""
+        return 0 if self.last is None else self.last.n_matches + (self.last.n_fixed_matches or 0)
 
     @property
     def accel_rms(self) -> float:
@@ -59,7 +63,7 @@ class Trial:
         last = self.last
         return (
             last is not None
-            and last.n_matches >= FEWEST_MATCHES
+            and self.n_matches >= FEWEST_MATCHES
             and (last.inlier_share or 0.0) >= PROMISING
         )
 
@@ -71,7 +75,7 @@ class Trial:
             last is not None
             and last.inlier_share is not None
             and last.residual_rms is not None
-            and last.n_matches >= FEWEST_MATCHES
+            and self.n_matches >= FEWEST_MATCHES
             and last.inlier_share >= LEAST_INLIERS
             and last.residual_rms <= MOST_RESIDUAL
         )

@@ -28,8 +28,6 @@ LARGEST_DELAY = 5.0  # s
 COARSE, FINE = 0.02, 0.001  # s
 LEAST_OVERLAP = 5.0  # s
 SHORT_HALF = 0.01  # s, of the forces before they are smoothed
-# Without this much turn about a third axis nothing tells whether the readings are mirrored.
-LEAST_THIRD = 0.03  # rad/s
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +42,6 @@ class GyroFit:
     scale : of the gyro
     correlation : of the delayed readings with the motion, 0 to 1, in any rotation
     left : share of the gyro's variation that M does not explain; `mirrored_left` of the other one
-    tells_hand : whether the motion is rich enough to tell which of both holds
     """
 
     delay: float
@@ -54,7 +51,6 @@ class GyroFit:
     correlation: float
     left: float
     mirrored_left: float
-    tells_hand: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +86,6 @@ def fit_gyro(motion: LidarMotion, imu: ImuBatch, delays: Sequence[float] | None 
     delay = float(max(delays, key=lambda d: _correlation(motion, gyro, d)))
     rates, readings = _pairs(motion, gyro, delay)
     direct, mirrored = (_orthogonal(rates, readings, hand) for hand in (1.0, -1.0))
-    spread = np.sqrt(np.maximum(np.linalg.eigvalsh(rates.T @ rates / max(len(rates), 1)), 0.0))
     if direct[2] <= mirrored[2]:
         best, other = direct, mirrored
     else:
@@ -103,7 +98,6 @@ def fit_gyro(motion: LidarMotion, imu: ImuBatch, delays: Sequence[float] | None 
         _correlation(motion, gyro, delay),
         best[2],
         other[2],
-        bool(spread[0] > LEAST_THIRD),
     )
 
 

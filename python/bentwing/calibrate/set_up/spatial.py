@@ -100,7 +100,7 @@ def followed(stretch: Stretch, payload: Payload, threads: int | None) -> LidarMo
 
 def _hands(gyro: GyroFit) -> Iterator[NDArray[np.float64]]:
     yield gyro.M
-    if not gyro.tells_hand or gyro.left > HAND_IS_CLEAR * gyro.mirrored_left:
+    if gyro.left > HAND_IS_CLEAR * gyro.mirrored_left:
         yield gyro.mirrored_M
 
 

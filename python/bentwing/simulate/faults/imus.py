@@ -118,7 +118,7 @@ FAULTS = (
         "Half way on, the IMU repeats one sample.",
         _frozen,
         "none",
-        r"(IMU|gyro|acceler).*(froze|stopp|repeat|constant|same|stuck|not change)",
+        r"(IMU|gyro|acceler).*(froze|stop|repeat|constant|same|stuck|not change)",
     ),
     Fault(
         "imu-10hz",

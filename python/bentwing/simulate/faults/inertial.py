@@ -28,7 +28,7 @@ SATURATED = 0.4
 """Share of its largest rate at which the gyro is clipped."""
 
 GYRO, ACCEL = r"gyro|angular rate", r"acceler"
-_AXES = r"ax[ie]s|mirror|sign|handed|swap|permut|direction"
+_AXES = r"ax[ie]s|mirror|sign|handed|swap|permute|direction"
 _GYRO_AXES = rf"({GYRO}).*({_AXES})|({_AXES}).*({GYRO})"
 _ACCEL_AXES = rf"({ACCEL}).*({_AXES})|({_AXES}).*({ACCEL})"
 _IMU_AXES = rf"(IMU|{GYRO}|{ACCEL}).*({_AXES})|({_AXES}).*IMU|mount|T_imu_lidar"

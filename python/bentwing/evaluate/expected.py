@@ -19,7 +19,7 @@ _SHORT = 10.0  # m, of the second statement
 
 @dataclass(frozen=True, slots=True)
 class ExpectedAccuracy:
-    """Errors that 68 % of the errors are below, relative to the first pose.
+    """What 68 % of the errors are below, relative to the first pose.
 
     Attributes
     ----------

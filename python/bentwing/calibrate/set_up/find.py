@@ -13,6 +13,7 @@ from bentwing.calibrate.set_up.motor import UNITS, describe_motor, zero_between
 from bentwing.calibrate.set_up.planar import describe_by_trials
 from bentwing.calibrate.set_up.refine import refined
 from bentwing.calibrate.set_up.set_up import SetUp
+from bentwing.calibrate.set_up.signals import Averages
 from bentwing.calibrate.set_up.spatial import NotFoundError, describe_by_motion, followed
 from bentwing.calibrate.set_up.stretch import read_stretch
 from bentwing.calibrate.set_up.units import with_imu_units, with_range_unit
@@ -25,8 +26,10 @@ if TYPE_CHECKING:
 
     from bentwing.calibrate.set_up.motor import Joint
     from bentwing.calibrate.set_up.stretch import Stretch
-    from bentwing.recording import Payload
+    from bentwing.recording import ImuBatch, Payload
 
+TURNING = 0.1  # rad/s, more than the bias of any gyro
+LEAST_TURNING, STEP = 2.0, 0.5  # s, and s over which rates are averaged
 LOOKED_AT = 5000  # points that tell a 2D lidar from a 3D one
 
 
@@ -85,6 +88,7 @@ class _Search:
         if self._imu is None:
             return self._turned(start)[0]
         start = with_imu_units(start, self._stretch.imu, self._imu)
+        _require_motion(self._stretch.read_as(start).imu)
         if is_plane(points[:: max(1, len(points) // LOOKED_AT)]):
             found, stretch = self._by_trials(start), self._stretch
         else:
@@ -118,6 +122,20 @@ class _Search:
         angles = joints[found.encoder.joint, found.encoder.unit]
         signed = EncoderBatch(angles.times, found.encoder.sign * angles.angles)
         return found, self._stretch.with_encoder(signed)
+
+
+def _require_motion(imu: ImuBatch) -> None:
+    """Refuse a head that does not turn: at rest every set-up agrees with what is seen."""
+    if len(imu.times) > 1 and float(np.ptp(imu.times)) > LEAST_TURNING:
+        times = np.arange(imu.times[0] + STEP / 2, imu.times[-1] - STEP / 2, STEP)
+        rates = np.linalg.norm(Averages(imu.times, imu.gyro).about(times, STEP / 2), axis=1)
+        if STEP * float((rates > TURNING).sum()) >= LEAST_TURNING:
+            return
+    msg = (
+        "the head does not turn, or for too short a time, and only motion shows how it is set up: "
+        "record some seconds with turns about two axes"
+    )
+    raise NotFoundError(msg)
 
 
 def _with_clocks(recording: Recording, payload: Payload) -> Payload:

@@ -107,6 +107,7 @@ def test_a_file_that_is_no_recording_is_an_error(tmp_path):
         inspect(path)
 
 
-def test_a_payload_without_mount_is_told(tmp_path, ros1):
+def test_a_mount_that_no_payload_tells_is_said_with_its_line(tmp_path, ros1):
     found = inspect(ros1.write(tmp_path / "a.bag", with_rest(ros1)), Payload(imu={}))
-    assert any("give T_imu_lidar" in text for text in found.defects)
+    assert [finding.kind for finding in found.set_up.findings] == ["mount"]
+    assert found.set_up.findings[0].line.startswith("T_imu_lidar: ")

@@ -46,7 +46,8 @@ def flight_of(options: argparse.Namespace, work: Path, scene: str, head: str, se
     """A flight in the folder for all of them."""
     scenario = Scenario(scene=scene, head=head, seed=seed, duration=options.duration, **more)
     name = "-".join([scene, head, str(seed), scenario.spin, *scenario.events])
-    return Flight(scenario, work / name)
+    words = ("--trust-payload",) if options.trust_payload else ()
+    return Flight(scenario, work / name, words)
 
 
 def flights(options: argparse.Namespace, work: Path) -> Iterator[tuple[Flight, list[str]]]:
@@ -145,6 +146,7 @@ def parsed() -> argparse.Namespace:
     parser.add_argument("--duration", type=float, default=24.0, help="of each flight, in s")
     parser.add_argument("--good", type=int, default=0, metavar="N", help="good recordings, with events as well")  # fmt: skip
     parser.add_argument("--payload", choices=["given", "none"], default="given")
+    parser.add_argument("--trust-payload", action="store_true", help="repair nothing: what the verdict alone says")  # fmt: skip
     parser.add_argument("--work", type=Path, help="keep the simulated recordings here")
     parser.add_argument("--json", type=Path, default=RESULTS, help="default: %(default)s")
     return parser.parse_args()

@@ -33,10 +33,12 @@ class Flight:
     ----------
     scenario : what is simulated
     folder : for the recording, made when it is needed first
+    words : further options of `bentwing map`
     """
 
     scenario: Scenario
     folder: Path
+    words: tuple[str, ...] = ()
 
     @cached_property
     def truth(self) -> Truth:
@@ -55,7 +57,7 @@ class Flight:
         with TemporaryDirectory(dir=self.folder) as scratch:
             run, said = Path(scratch) / "run", Path(scratch) / "said.txt"
             described = ["--payload", folder / "payload.yaml"] if payload else []
-            words = ["map", folder / "recording.bag", *described, "-o", run, "--quiet"]
+            words = ["map", folder / "recording.bag", *described, "-o", run, "--quiet", *self.words]
             finished = python("-m", "bentwing", *words, output=said)
             record = _record(run)
             error = _error(self.truth, run, fault) if finished.code in (0, 4) else None

@@ -96,13 +96,13 @@ def test_what_cannot_be_put_right_is_named(faulted, fault):
 def test_no_payload_is_needed(simulated, tmp_path, head):
     folder = simulated("office", 22.0, head=head)
     run = map_recording(folder / "recording.bag", None, tmp_path / "run", map_spacing=0.05)
-    assert run.verdict.state != "failed"
+    assert run.verdict.state == "good"
     true = Payload.load(folder / "payload.yaml").T_imu_lidar.pose
     turn = geometry.multiply(
         geometry.inverse(true.quaternion), run.estimate.calibration.mount.T_imu_lidar.quaternion
     )
     assert np.degrees(np.linalg.norm(geometry.log(turn[None]))) < 1.5
-    assert score(folder, tmp_path / "run").ate < 0.02
+    assert score(folder, tmp_path / "run").ate < 0.006
 
 
 def test_a_draft_knows_no_mount(simulated):

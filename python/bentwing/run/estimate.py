@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 from bentwing import odometry
 from bentwing.base.errors import EstimationError, RecordingError
 from bentwing.run.first_pass import FirstPass, blames_head
-from bentwing.run.head import ALL_THE_SAME
 
 if TYPE_CHECKING:
     from bentwing.calibrate.set_up import SetUp
@@ -70,4 +69,4 @@ def _is_doubted(first: Found) -> bool:
 
 def _refusal(verdict: Verdict, shown: SetUp) -> str:
     main = verdict.reasons[0]
-    return f"{shown.doubt} ({main.sentence}); {ALL_THE_SAME}"
+    return f"{shown.doubt} ({main.sentence}); to map it as payload.yaml says all the same, give --trust-payload"

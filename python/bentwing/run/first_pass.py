@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from bentwing.base.errors import EstimationError
 from bentwing.calibrate.carrier import CarrierWatch, carrier_warnings
-from bentwing.evaluate.verdict import Watch, judge_estimate, judge_so_far
+from bentwing.evaluate.verdict import EarlyJudge, Watch, judge_estimate
 from bentwing.run.found import Reading, Spin
 
 if TYPE_CHECKING:
@@ -21,9 +21,6 @@ if TYPE_CHECKING:
     from bentwing.run.found import Found
     from bentwing.run.stages import Job
 
-# How often the beginning of an estimate is judged, s, and until when: later its set-up is known to be
-# right.
-_INTERVAL, _UNTIL = 2.0, 60.0
 # Reasons that another set-up of the head may explain, and those that no set-up does.
 _OF_HEAD = frozenset(
     (
@@ -64,8 +61,7 @@ class FirstPass:
         self._spin, self._watch = Spin(), Watch()
         self._carrier = CarrierWatch(job.part.payload)
         self._counts = Counter[str]()
-        self._judged: float | None = None
-        self._until = 0.0
+        self._judge = EarlyJudge(job.part.payload, self._watch)
 
     def run(self, found: Found) -> Found:
         """Return what is known with the estimate; with a failure, as far as it goes."""
@@ -97,19 +93,11 @@ class FirstPass:
             self._carrier.add(batch)
 
     def _doubt(self, batch: Batch) -> Verdict | None:
-        """Judge the estimate so far, now and then; returns the verdict if it is wrong."""
+        """Return the verdict on the estimate so far if it is wrong and the head may be to blame."""
         if not self._may_stop or not len(batch.times):
             return None
-        now = float(batch.times[-1])
-        if self._judged is None:
-            self._judged, self._until = now, now + _UNTIL
-        if now < self._judged + _INTERVAL or now > self._until:
-            return None
-        self._judged = now
-        known = self._engine.current
-        estimate = None if known is None else known.estimate()
-        verdict = judge_so_far(estimate, self._job.part.payload, self._watch)
-        return verdict if verdict.state == "failed" and blames_head(verdict) else None
+        verdict = self._judge.failure(float(batch.times[-1]), self._engine.current)
+        return verdict if verdict is not None and blames_head(verdict) else None
 
     def _so_far(self, error: BaseException | None = None) -> Estimate | None:
         # There may be nothing yet, and an interrupt may find a step half done.

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from bentwing.calibrate.set_up import SetUp
     from bentwing.run.settings import RunSettings
 
-ALL_THE_SAME = "to map it all the same, give --force"
+_ALL_THE_SAME = "to map it all the same, give --force"
 
 
 class Head:
@@ -91,15 +91,13 @@ class Head:
             found = self.found()
             if found.doubt is not None:
                 msg = (
-                    f"{_listed([*defects])} ({found.doubt})"
-                    if self._lacks_mount
-                    else _listed(defects)
+                    f"{_listed(defects)} ({found.doubt})" if self._lacks_mount else _listed(defects)
                 )
-                raise RecordingError(f"{msg}; {ALL_THE_SAME}")
+                raise RecordingError(f"{msg}; {_ALL_THE_SAME}")
             self.use(found)
             defects = judge(self.recording, has_payload=True).defects
         if defects:
-            msg = f"{_listed(defects)}; {ALL_THE_SAME}"
+            msg = f"{_listed(defects)}; {_ALL_THE_SAME}"
             raise RecordingError(msg)
         self.recording.check()
 

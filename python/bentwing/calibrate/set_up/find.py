@@ -10,6 +10,7 @@ import numpy as np
 from bentwing.calibrate.set_up import edits
 from bentwing.calibrate.set_up.compare import findings_between
 from bentwing.calibrate.set_up.motor import UNITS, describe_motor, zero_between
+from bentwing.calibrate.set_up.noise import with_imu_noise
 from bentwing.calibrate.set_up.planar import describe_by_trials
 from bentwing.calibrate.set_up.refine import refined
 from bentwing.calibrate.set_up.set_up import SetUp
@@ -88,7 +89,10 @@ class _Search:
         if self._imu is None:
             return self._turned(start)[0]
         start = with_imu_units(start, self._stretch.imu, self._imu)
-        _require_motion(self._stretch.read_as(start).imu)
+        imu = self._stretch.read_as(start).imu
+        _require_motion(imu)
+        if not self._has_mount:
+            start = with_imu_noise(start, imu)
         if is_plane(points[:: max(1, len(points) // LOOKED_AT)]):
             found, stretch = self._by_trials(start), self._stretch
         else:
@@ -139,10 +143,14 @@ def _require_motion(imu: ImuBatch) -> None:
 
 
 def _with_clocks(recording: Recording, payload: Payload) -> Payload:
-    """Return the payload with the offsets of clocks that count from somewhere else, in whole stamps."""
-    for role, offset in recording.clock_offsets().items():
-        change = edits.with_imu if role == "imu" else edits.with_encoder
-        payload = change(payload, clock_offset=offset)
+    """Return the payload with the offsets of clocks that count from somewhere else."""
+    offsets = recording.clock_offsets()
+    if "imu" in offsets:
+        before = 0.0 if payload.imu is None else payload.imu.clock_offset
+        payload = edits.with_imu(payload, clock_offset=before + offsets["imu"])
+    if "encoder" in offsets and payload.encoder is not None:
+        before = payload.encoder.clock_offset
+        payload = edits.with_encoder(payload, clock_offset=before + offsets["encoder"])
     return payload
 
 
@@ -151,7 +159,9 @@ def _joints(paths: Sequence[Path], payload: Payload, stretch: Stretch) -> dict[J
     with Recording(paths, payload, strict=False) as recording:
         names = recording.joints
     found: dict[Joint, EncoderBatch] = {}
-    for name in names if len(names) > 1 else (None,):
+    # The only joint of a topic need not be named.
+    only = None if payload.encoder is None else payload.encoder.joint
+    for name in names if len(names) > 1 else (only,):
         for unit in UNITS:
             read = edits.with_encoder(payload, joint=name, unit=unit, sign=1)
             with Recording(paths, read, strict=False) as recording:

@@ -10,14 +10,12 @@ from bentwing.calibrate.set_up import edits
 from bentwing.calibrate.set_up.planar import richest
 from bentwing.calibrate.set_up.spatial import NotFoundError
 from bentwing.calibrate.set_up.trial import try_payload
-from bentwing.recording.sections.imu import Imu
 from bentwing.recording.sections.section import Transform
 
 if TYPE_CHECKING:
     from bentwing.base.calibration import Calibration
     from bentwing.base.mount import Pose
     from bentwing.calibrate.set_up.stretch import Stretch
-    from bentwing.calibrate.set_up.trial import Trial
     from bentwing.recording import Payload
 
 # Standard deviations of what was found before: s, rad; and of a shift that nothing has told yet, m.
@@ -45,23 +43,11 @@ def refined(stretch: Stretch, payload: Payload, *, has_mount: bool, threads: int
     found = edits.with_latency(payload, trial.calibration.source_latency)
     if not has_mount:
         # What little was seen leaves of it is still to be found.
-        found = _with_noise(edits.with_std(found, **_std(trial.calibration)), trial)
+        found = edits.with_std(found, **_std(trial.calibration))
     if isinstance(mount, FixedMount):
         return found.model_copy(update={"T_imu_lidar": _transform(mount.T_imu_lidar)})
     return edits.with_encoder(
         found, T_imu_motor=_transform(mount.T_imu_motor), zero=mount.encoder_zero
-    )
-
-
-def _with_noise(payload: Payload, trial: Trial) -> Payload:
-    """Return the payload with as much noise of the IMU as its residuals show, where that is more."""
-    imu, last = payload.imu or Imu(), trial.last
-    assert last is not None
-    gyro, accel = max(1.0, last.gyro_rms or 1.0), max(1.0, last.accel_rms or 1.0)
-    if gyro == accel == 1.0:
-        return payload
-    return edits.with_imu(
-        payload, gyro_noise=imu.gyro_noise * gyro, accel_noise=imu.accel_noise * accel
     )
 
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from bentwing.evaluate.verdict.closing import judge_closing, judge_revisits
+from bentwing.evaluate.verdict.early import EarlyJudge
 from bentwing.evaluate.verdict.evidence import Evidence
 from bentwing.evaluate.verdict.judge import judge_estimate, judge_so_far
 from bentwing.evaluate.verdict.kinds import KINDS
@@ -13,6 +14,7 @@ from bentwing.evaluate.verdict.watch import Watch
 
 __all__ = [
     "KINDS",
+    "EarlyJudge",
     "Evidence",
     "Reason",
     "Verdict",

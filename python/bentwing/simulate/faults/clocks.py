@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from bentwing.simulate.faults.fault import Changes, Fault, Subject
 from bentwing.simulate.faults.messages import NS_PER_S, set_stamp, stamp_ns
@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from bentwing.simulate.faults.fault import Edit, Message, Repair
+    from bentwing.simulate.names import FaultName
 
 CAUSE = r"clock|latency|stamp|\b(late|early)\b|delay"
 FITTED = 1.0
@@ -55,7 +56,7 @@ def _drifting(subject: Subject) -> Changes:
 def _off(seconds: float, way: str, sign: float) -> Fault:
     repair: Repair = "latency" if seconds <= FITTED else "none"
     return Fault(
-        f"lidar-{way}-{seconds:g}",  # type: ignore[arg-type]
+        cast("FaultName", f"lidar-{way}-{seconds:g}"),
         f"The stamps of the lidar, and of its encoder, are {seconds:g} s too {way}.",
         _late(sign * seconds),
         repair,

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import NDArray
+
+    from bentwing.simulate.names import FaultName
 
 CAUSE = r"mount|T_imu_lidar|T_imu_motor|T_motor_lidar|lidar (is|sits) turned|quaternion"
 TILT = np.radians(20.0), np.radians(30.0)
@@ -74,7 +76,7 @@ def _direction(rng: np.random.Generator) -> NDArray[np.float64]:
 def _square(degrees: int, axis: str) -> Fault:
     vector = np.radians(degrees) * np.eye(3)["xyz".index(axis)]
     return Fault(
-        f"mount-{degrees}-{axis}",  # type: ignore[arg-type]
+        cast("FaultName", f"mount-{degrees}-{axis}"),
         f"The payload has the mount turned by {degrees}° about the IMU's {axis}.",
         _turned(lambda _: vector),
         "mount",

@@ -88,7 +88,9 @@ def test_what_was_told_is_read_from_the_exit_code_the_record_and_the_output() ->
 
 def options(**given) -> argparse.Namespace:
     chosen = {"heads": list(faults.HEADS), "scenes": list(faults.SCENES), "seeds": [7], "good": 0}
-    return argparse.Namespace(**{"faults": [], "duration": 24.0, "trust_payload": False, **chosen, **given})
+    return argparse.Namespace(
+        **{"faults": [], "duration": 24.0, "trust_payload": False, **chosen, **given}
+    )
 
 
 def test_good_flights_go_through_heads_scenes_and_events() -> None:

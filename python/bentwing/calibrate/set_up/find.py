@@ -10,7 +10,7 @@ import numpy as np
 from bentwing.calibrate.set_up import edits
 from bentwing.calibrate.set_up.compare import findings_between
 from bentwing.calibrate.set_up.motor import UNITS, describe_motor, zero_between
-from bentwing.calibrate.set_up.noise import with_imu_noise
+from bentwing.calibrate.set_up.noise import ImuNoise, states_noise
 from bentwing.calibrate.set_up.planar import describe_by_trials
 from bentwing.calibrate.set_up.refine import refined
 from bentwing.calibrate.set_up.set_up import SetUp
@@ -70,6 +70,7 @@ class _Search:
 
     def __init__(self, paths: Sequence[Path], payload: Payload, threads: int | None) -> None:
         self._paths, self._threads = paths, threads
+        self._given = payload
         self._has_mount = payload.places_lidar_on_imu
         self._start = edits.as_given(payload)
         with Recording(paths, self._start, strict=False) as recording:
@@ -91,8 +92,8 @@ class _Search:
         start = with_imu_units(start, self._stretch.imu, self._imu)
         imu = self._stretch.read_as(start).imu
         _require_motion(imu)
-        if not self._has_mount:
-            start = with_imu_noise(start, imu)
+        if not self._has_mount and not states_noise(start):
+            start = ImuNoise.of(imu).at_least_in(start)
         if is_plane(points[:: max(1, len(points) // LOOKED_AT)]):
             found, stretch = self._by_trials(start), self._stretch
         else:
@@ -100,9 +101,8 @@ class _Search:
         return refined(stretch, found, has_mount=self._has_mount, threads=self._threads)
 
     def _by_trials(self, start: Payload) -> Payload:
-        return describe_by_trials(
-            self._stretch, start, has_mount=self._has_mount, threads=self._threads
-        )
+        given = self._given if self._has_mount else None
+        return describe_by_trials(self._stretch, start, given, threads=self._threads)
 
     def _by_motion(self, start: Payload, imu_topic: str) -> tuple[Payload, Stretch]:
         turned, stretch = self._turned(start)

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""The noise of an IMU that nobody describes, vibration included, from its samples."""
+"""The noise of an IMU from its samples."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,23 +24,34 @@ _MEDIAN = 0.6745
 _SECOND = np.sqrt(6.0)
 
 
-def with_imu_noise(payload: Payload, imu: ImuBatch) -> Payload:
-    """Return the payload with the noise densities of its IMU, where it states none.
+@dataclass(frozen=True, slots=True)
+class ImuNoise:
+    """Noise densities of an IMU, vibration included.
 
-    Parameters
+    Attributes
     ----------
-    imu : samples in SI units, in motion
+    gyro, accel : rad/s/√Hz, m/s²/√Hz
     """
-    described = payload.imu or Imu()
-    if described.model_fields_set & _STATED or float(np.ptp(imu.times)) < 1.0:
-        return payload
-    step = float(np.median(np.diff(imu.times)))
-    gyro, accel = (_density(samples, step) for samples in (imu.gyro, imu.accel))
-    return edits.with_imu(
-        payload,
-        gyro_noise=max(described.gyro_noise, gyro),
-        accel_noise=max(described.accel_noise, accel),
-    )
+
+    gyro: float
+    accel: float
+
+    @classmethod
+    def of(cls, imu: ImuBatch) -> ImuNoise:
+        """Measure it in samples in SI units, a second of them or more."""
+        step = float(np.median(np.diff(imu.times)))
+        return cls(_density(imu.gyro, step), _density(imu.accel, step))
+
+    def at_least_in(self, payload: Payload) -> Payload:
+        """Return the payload with no less noise than this."""
+        imu = payload.imu or Imu()
+        gyro, accel = max(imu.gyro_noise, self.gyro), max(imu.accel_noise, self.accel)
+        return edits.with_imu(payload, gyro_noise=gyro, accel_noise=accel)
+
+
+def states_noise(payload: Payload) -> bool:
+    """Whether a payload says how noisy its IMU is."""
+    return payload.imu is not None and bool(payload.imu.model_fields_set & _STATED)
 
 
 def _density(samples: NDArray[np.float64], step: float) -> float:

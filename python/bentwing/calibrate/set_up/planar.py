@@ -13,7 +13,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from bentwing.base.mount import FixedMount
 from bentwing.calibrate.set_up import axes, edits
+from bentwing.calibrate.set_up.noise import ImuNoise
 from bentwing.calibrate.set_up.returns import NEARBY, delays_by_returns
 from bentwing.calibrate.set_up.rotations import cover
 from bentwing.calibrate.set_up.spatial import NotFoundError
@@ -41,31 +43,43 @@ UNKNOWN_SHIFT = 0.1  # m, std where no mount is described
 # The axes of the samples hold where others explain how gravity turns hardly better.
 AS_GOOD = 1.3
 SECOND_GLANCES = 8
-# Where the noise of the accelerometer is as stated its residuals are no larger, in units of it.
-AS_STATED = 2.0
+_POINT = (
+    "either the lidar is mounted with half a turn about the normal of its scan plane, or all axes of the "
+    "accelerometer are negated; a 2D lidar sees both alike: turn T_imu_lidar, or write imu: "
+    "{axes: [-x, -y, -z], gyro_axes: [x, y, z]}"
+)
+_PLANE = (
+    "either all axes of the gyro are negated, or the axis of the IMU across the scan plane of the lidar "
+    "is; a 2D lidar sees both alike: write imu: {gyro_axes: [-x, -y, -z]}, or that axis negated in imu: "
+    "{axes: [x, y, z]}"
+)
 
 
 def describe_by_trials(
-    stretch: Stretch, payload: Payload, *, has_mount: bool, threads: int | None
+    stretch: Stretch, payload: Payload, given: Payload | None, *, threads: int | None
 ) -> Payload:
     """Return the payload with which what the lidar sees fits together.
 
     Parameters
     ----------
     stretch : as drivers give it
-    has_mount : whether the payload describes the mount
+    payload : that says nothing of axes and latency
+    given : the payload as it was given, None where that one describes no mount
 
     Raises
     ------
     NotFoundError
-        None of the descriptions does.
+        None of the descriptions does, or two of them do.
     """
-    trials, imu = _Trials(stretch, threads), stretch.read_as(payload).imu
+    imu = stretch.read_as(payload).imu
+    trials = _Trials(stretch, ImuNoise.of(imu), threads)
+    if given is not None and (found := trials.consistent(given, rotation=AS_DESCRIBED)):
+        return found
     seen = delays_by_returns(stretch, imu)
     # The clocks may well agree, whatever the returns seem to say.
     delays = seen if any(abs(delay) < NEARBY for delay in seen) else [0.0, *seen]
     ranked = _ranked_axes(imu)
-    if has_mount:
+    if given is not None:
         for delay, rotation in itertools.product(delays, (AS_DESCRIBED, CLOSE)):
             described = edits.with_latency(payload, delay)
             if (found := trials.consistent(described, rotation=rotation)) is not None:
@@ -73,11 +87,11 @@ def describe_by_trials(
         likely = edits.with_latency(payload, delays[0])
         if (found := trials.with_other_axes(likely, ranked)) is not None:
             return found
-    centre = edits.described_rotation(payload) if has_mount else None
+    centre = None if given is None else edits.described_rotation(payload)
     # A head that nods in time with itself agrees with other delays as well: only the best is tried.
     described = edits.with_axes(edits.with_latency(payload, delays[0]), ranked[0], np.eye(3))
+    middle = Rotation.identity() if centre is None else Rotation.from_matrix(centre)
     for length, aside in ((GLANCE, Rotation.identity()), (LONG_GLANCE, ASIDE)):
-        middle = Rotation.identity() if centre is None else Rotation.from_matrix(centre)
         if (found := trials.searched(described, middle * aside, length)) is not None:
             return found
     raise NotFoundError(trials.failure)
@@ -86,8 +100,8 @@ def describe_by_trials(
 class _Trials:
     """Tries descriptions on the richest part of a stretch."""
 
-    def __init__(self, stretch: Stretch, threads: int | None) -> None:
-        self._stretch, self._threads = stretch, threads
+    def __init__(self, stretch: Stretch, noise: ImuNoise, threads: int | None) -> None:
+        self._stretch, self._noise, self._threads = stretch, noise, threads
         self._best: Trial | None = None
 
     def consistent(self, payload: Payload, *, rotation: float) -> Payload | None:
@@ -112,32 +126,27 @@ class _Trials:
     def with_other_axes(
         self, payload: Payload, ranked: Sequence[NDArray[np.float64]]
     ) -> Payload | None:
-        """Look for other axes of the gyro or of the accelerometer, then of both."""
-        for group in (_of_one_sensor(ranked), _of_both_sensors(ranked)):
-            trials = []
-            for gyro, accel in group:
-                described = edits.with_axes(payload, gyro, accel)
-                glance = self._tried(described, CLOSE, GLANCE)
-                trial = self._again(described, glance) if glance.is_promising else glance
-                if trial.is_consistent and trial.accel_rms <= AS_STATED:
-                    return _learned(described, trial)
-                trials += [trial] if trial.is_consistent else []
-            if trials:
-                # In a mirrored world the surfaces agree as well, but not the forces.
-                best = min(trials, key=lambda trial: trial.accel_rms)
-                return _learned(best.payload, best)
+        """Look for other axes of the gyro or of the accelerometer, then of both.
+
+        Raises
+        ------
+        NotFoundError
+            A 2D lidar sees the same with another mistake.
+        """
+        for gyro, accel in [*_of_one_sensor(ranked), *_of_both_sensors(ranked)]:
+            described = edits.with_axes(payload, gyro, accel)
+            glance = self._tried(described, CLOSE, GLANCE)
+            if glance.is_promising and (found := self._confirmed(described, glance)) is not None:
+                _require_one_meaning(gyro, accel)
+                return found
         return None
 
     def _confirmed(self, payload: Payload, glance: Trial) -> Payload | None:
         """Return what a glance has learned if all fits together with it."""
-        trial = self._again(payload, glance)
-        return _learned(payload, trial) if trial.is_consistent else None
-
-    def _again(self, payload: Payload, glance: Trial) -> Trial:
-        """Try what a glance has learned; what it saw first was blurred by where it came from."""
         if glance.calibration is None:
-            return glance
-        return self._tried(_learned(payload, glance), CLOSE, TRIED)
+            return None
+        # What it saw first was blurred by where it came from.
+        return self.consistent(_learned(payload, glance), rotation=CLOSE)
 
     @property
     def failure(self) -> str:
@@ -146,7 +155,7 @@ class _Trials:
 
     def _tried(self, payload: Payload, rotation: float, length: float) -> Trial:
         wide = edits.with_std(
-            payload,
+            self._noise.at_least_in(payload),
             extrinsic_rotation=rotation,
             extrinsic_translation=UNKNOWN_SHIFT if rotation > AS_DESCRIBED else 0.0,
             latency=UNKNOWN_LATENCY,
@@ -163,10 +172,22 @@ def _learned(payload: Payload, trial: Trial) -> Payload:
     """Return a payload with the rotation and the delay that a trial came to."""
     assert trial.calibration is not None
     mount = trial.calibration.mount
-    base = mount.T_imu_lidar if hasattr(mount, "T_imu_lidar") else mount.T_imu_motor
-    rotated = edits.with_rotation(trial.payload, base.R)
-    kept = rotated.model_copy(update={"calibration": payload.calibration})
-    return edits.with_latency(kept, trial.calibration.source_latency)
+    base = mount.T_imu_lidar if isinstance(mount, FixedMount) else mount.T_imu_motor
+    rotated = edits.with_rotation(payload, base.R)
+    return edits.with_latency(rotated, trial.calibration.source_latency)
+
+
+def _require_one_meaning(gyro: NDArray[np.float64], accel: NDArray[np.float64]) -> None:
+    """Refuse axes with which a 2D lidar sees the mirror image of another set-up.
+
+    A plane is its own mirror image. So a world that is mirrored at a point looks the same to a scanner
+    that is turned by half a turn about the normal of its scans, and one that is mirrored at the plane to
+    the scanner as it is; the IMU feels a negated force in the one, and a negated turn in the other.
+    """
+    if np.array_equal(accel, -np.eye(3)) and np.array_equal(gyro, np.eye(3)):
+        raise NotFoundError(_POINT)
+    if np.array_equal(gyro, -np.eye(3)) and np.array_equal(accel, np.eye(3)):
+        raise NotFoundError(_PLANE)
 
 
 def richest(imu: ImuBatch, length: float) -> tuple[float, float]:

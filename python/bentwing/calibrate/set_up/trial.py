@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 PROMISING = 0.88
 # A wrong description never settles; a right one does soon.
 SETTINGS = ContinuousSettings(registration=RegistrationSettings(max_outer=8))
-LEAST_INLIERS, MOST_RESIDUAL, FEWEST_MATCHES = 0.95, 0.7, 150
+LEAST_INLIERS, MOST_RESIDUAL, MOST_FORCE, FEWEST_MATCHES = 0.95, 0.7, 3.0, 150
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,12 +52,6 @@ class Trial:
         return 0 if self.last is None else self.last.n_matches + (self.last.n_fixed_matches or 0)
 
     @property
-    def accel_rms(self) -> float:
-        """Residuals of the accelerometer in units of its stated noise; infinite where they are unknown."""
-        known = None if self.last is None else self.last.accel_rms
-        return float("inf") if known is None else known
-
-    @property
     def is_promising(self) -> bool:
         """Whether most of what was seen fits together."""
         last = self.last
@@ -78,6 +72,8 @@ class Trial:
             and self.n_matches >= FEWEST_MATCHES
             and last.inlier_share >= LEAST_INLIERS
             and last.residual_rms <= MOST_RESIDUAL
+            # In a mirrored world the surfaces agree as well, but not the forces.
+            and (last.accel_rms or 0.0) <= MOST_FORCE
         )
 
     @property

@@ -64,8 +64,8 @@ def test_a_head_that_is_as_described_stays_so(simulated, head):
             pytest.param(head, fault, marks=pytest.mark.slow)
             for head in HEADS
             for fault in FAULTS
-            # What a 2D lidar sees in a mirror, it sees from the other side of its plane.
-            if not (fault == "lidar-mirrored" and head.startswith("hokuyo"))
+            # A plane is its own mirror image.
+            if not (fault in {"lidar-mirrored", "gyro-negated"} and head.startswith("hokuyo"))
         ),
         *(pytest.param("vlp16-motor", fault, marks=pytest.mark.slow) for fault in ENCODER),
     ],
@@ -75,6 +75,31 @@ def test_what_is_wrong_is_found_and_named(faulted, head, fault):
     found = find_set_up([recording], Payload.load(payload))
     assert found.doubt is None
     assert FAULTS.get(fault, "encoder") in {finding.kind for finding in found.findings}
+
+
+@pytest.mark.parametrize(
+    ("fault", "words"),
+    [
+        ("mount-180-x", ("half a turn about the normal", "accelerometer are negated")),
+        pytest.param(
+            "gyro-negated", ("gyro are negated", "across the scan plane"), marks=pytest.mark.slow
+        ),
+    ],
+)
+def test_mirror_images_that_a_2d_lidar_cannot_tell_apart_are_both_named(faulted, fault, words):
+    # About the x axis of the IMU, which is the normal of the scans.
+    recording, payload = faulted("hokuyo-spin", fault)
+    doubt = find_set_up([recording], Payload.load(payload)).doubt
+    assert all(part in doubt for part in words)
+
+
+def test_an_answer_to_such_a_question_is_believed(faulted):
+    recording, payload = faulted("hokuyo-spin", "accel-negated")
+    described = Payload.load(payload)
+    told = {"axes": ("-x", "-y", "-z"), "gyro_axes": ("x", "y", "z")}
+    answered = described.model_copy(update={"imu": described.imu.model_copy(update=told)})
+    found = find_set_up([recording], answered)
+    assert (found.doubt, found.findings) == (None, ())
 
 
 @pytest.mark.parametrize("fault", ["gyro-zero", "accel-no-gravity", "gyro-1.2"])

@@ -70,14 +70,16 @@ def test_a_map_that_is_wrong_ends_with_exit_code_4_and_all_files(office, bentwin
 
 
 def test_a_map_that_can_be_put_right_is_and_says_so_first(office, bentwing, tmp_path):
-    with_fault(office / "recording.bag", office / "payload.yaml", "gyro-negated", tmp_path, seed=1)
+    with_fault(
+        office / "recording.bag", office / "payload.yaml", "gyro-one-negated", tmp_path, seed=1
+    )
     out = tmp_path / "run"
     said = bentwing(
         "map", tmp_path / "recording.bag", "-p", tmp_path / "payload.yaml", "-o", out,
         "--map-spacing", "0.1",
     )  # fmt: skip
     assert said.code == 0, said.err
-    line = "imu: {axes: [x, y, z], gyro_axes: [-x, -y, -z]}"
+    line = "imu: {axes: [x, y, z], gyro_axes: [x, y, -z]}"
     assert line in said.err
     record = json.loads((out / "run.json").read_text())
     assert [(found["kind"], found["line"]) for found in record["set_up"]] == [("axes", line)]

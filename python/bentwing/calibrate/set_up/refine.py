@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from bentwing.base.mount import FixedMount
 from bentwing.calibrate.set_up import edits
+from bentwing.calibrate.set_up.noise import ImuNoise
 from bentwing.calibrate.set_up.planar import richest
 from bentwing.calibrate.set_up.spatial import NotFoundError
 from bentwing.calibrate.set_up.trial import try_payload
@@ -36,6 +37,7 @@ def refined(stretch: Stretch, payload: Payload, *, has_mount: bool, threads: int
     if not has_mount:
         wide = edits.with_std(wide, extrinsic_translation=UNKNOWN_SHIFT)
     read = stretch.read_as(wide)
+    wide = ImuNoise.of(read.imu).at_least_in(wide)
     trial = try_payload(read.part(*richest(read.imu, REFINED)), wide, threads)
     if not trial.is_consistent or trial.calibration is None:
         raise NotFoundError(trial.sentence)

@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from bentwing.calibrate.set_up import axes
+from bentwing.calibrate.set_up import axes, edits
+from bentwing.calibrate.set_up.compare import findings_between
 from bentwing.calibrate.set_up.explain import explain
+from bentwing.recording import Payload
 
 DESCRIBED = Rotation.from_euler("xyz", [10, -20, 70], degrees=True).as_matrix()
 MIRROR = np.diag([1.0, -1.0, 1.0])
@@ -78,3 +80,10 @@ def test_a_mirrored_scan_is_told_by_the_mount_that_is_described() -> None:
 def test_axes_that_are_no_axes_have_no_explanation() -> None:
     skew = Rotation.from_euler("xyz", [40, 30, 20], degrees=True).as_matrix()
     assert explain(DESCRIBED, skew @ DESCRIBED, DESCRIBED) is None
+
+
+def test_a_mount_that_no_payload_tells_is_said_with_its_line() -> None:
+    bare = Payload(imu={})
+    (finding,) = findings_between(bare, edits.with_rotation(bare, DESCRIBED))
+    assert finding.kind == "mount"
+    assert finding.line.startswith("T_imu_lidar: ")

@@ -67,14 +67,22 @@ def with_latency(payload: Payload, latency: float) -> Payload:
 
 def with_rotation(payload: Payload, R: NDArray[np.float64]) -> Payload:
     """Return the payload with another rotation (3, 3) of the lidar, or of its motor, in the IMU."""
-    quat = tuple(float(x) for x in geometry.from_matrices(R[None]).reshape(4))
+    quat = geometry.from_matrices(R[None]).reshape(4)
+    return _placed(payload, quaternion=tuple(float(x) for x in quat))
+
+
+def with_shift(payload: Payload, shift: NDArray[np.float64]) -> Payload:
+    """Return the payload with another shift (3,), m, of the lidar, or of its motor, in the IMU."""
+    return _placed(payload, translation=tuple(float(x) for x in shift))
+
+
+def _placed(payload: Payload, **changes: tuple[float, ...]) -> Payload:
     if payload.encoder is not None:
-        turned = payload.encoder.T_imu_motor.model_copy(update={"quaternion": quat})
-        return with_encoder(payload, T_imu_motor=turned)
+        return with_encoder(
+            payload, T_imu_motor=payload.encoder.T_imu_motor.model_copy(update=changes)
+        )
     before = payload.T_imu_lidar or Transform()
-    return payload.model_copy(
-        update={"T_imu_lidar": before.model_copy(update={"quaternion": quat})}
-    )
+    return payload.model_copy(update={"T_imu_lidar": before.model_copy(update=changes)})
 
 
 def with_std(payload: Payload, **std: float) -> Payload:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""The set-up of a 2D lidar: descriptions are tried until what is seen fits together.
+"""The set-up of a 2D lidar: descriptions that may hold are tried until what is seen fits together.
 
 A 2D lidar cannot be followed by itself, but with the IMU it can be, and only with the right mount,
-axes and delay do the surfaces of its turns agree.
+axes and delay do the surfaces of its turns agree. Where its scans cross shows which may hold.
 """
 
 from __future__ import annotations
@@ -11,38 +11,34 @@ import itertools
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
-from bentwing.base.mount import FixedMount
 from bentwing.calibrate.set_up import axes, edits
+from bentwing.calibrate.set_up.crossings import Crossings, Reading
 from bentwing.calibrate.set_up.noise import ImuNoise
 from bentwing.calibrate.set_up.returns import NEARBY, delays_by_returns
-from bentwing.calibrate.set_up.rotations import cover
+from bentwing.calibrate.set_up.scans import Scans
 from bentwing.calibrate.set_up.spatial import NotFoundError
-from bentwing.calibrate.set_up.trial import try_payload
+from bentwing.calibrate.set_up.trials import Trials
 from bentwing.recording import imu_units
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from numpy.typing import NDArray
 
     from bentwing.calibrate.set_up.stretch import Stretch
-    from bentwing.calibrate.set_up.trial import Trial
     from bentwing.recording import ImuBatch, Payload
 
-TRIED, GLANCE = 6.0, 2.5  # s of the richest motion on which descriptions are tried, and first seen
-LONG_GLANCE = 4.5  # s, of a head that turns little
-# Rotations in the middle between those of a cover.
-ASIDE = Rotation.from_rotvec(np.radians(36.0) * np.array([0.0, 0.6, 0.8]))
-AS_DESCRIBED = 0.02  # rad, std of a rotation that may hold
-CLOSE = 0.2  # rad, std of a rotation that is described
-WIDE = 0.5  # rad, std of a rotation that is one of a cover
-UNKNOWN_LATENCY = 0.02  # s, std once it was found
-UNKNOWN_SHIFT = 0.1  # m, std where no mount is described
 # The axes of the samples hold where others explain how gravity turns hardly better.
 AS_GOOD = 1.3
-SECOND_GLANCES = 8
+LIKELY = 4  # delays that are tried first
+MAY_HOLD = 0.3  # of the way from the best misfit of crossings to what is usual
+# Of the logarithm of a range; where the best mount does no better, the surroundings tell no mount.
+TELLING = 0.02
+_ALIKE = (
+    "what the lidar sees fits together in any mount: record where there are walls and corners within "
+    "its reach"
+)
 _POINT = (
     "either the lidar is mounted with half a turn about the normal of its scan plane, or all axes of the "
     "accelerometer are negated; a 2D lidar sees both alike: turn T_imu_lidar, or write imu: "
@@ -72,109 +68,100 @@ def describe_by_trials(
         None of the descriptions does, or two of them do.
     """
     imu = stretch.read_as(payload).imu
-    trials = _Trials(stretch, ImuNoise.of(imu), threads)
-    if given is not None and (found := trials.consistent(given, rotation=AS_DESCRIBED)):
+    trials = Trials(stretch, ImuNoise.of(imu), has_mount=given is not None, threads=threads)
+    if given is not None and (found := trials.as_described(given)):
         return found
-    seen = delays_by_returns(stretch, imu)
-    # The clocks may well agree, whatever the returns seem to say.
-    delays = seen if any(abs(delay) < NEARBY for delay in seen) else [0.0, *seen]
-    ranked = _ranked_axes(imu)
-    if given is not None:
-        for delay, rotation in itertools.product(delays, (AS_DESCRIBED, CLOSE)):
-            described = edits.with_latency(payload, delay)
-            if (found := trials.consistent(described, rotation=rotation)) is not None:
-                return found
-        likely = edits.with_latency(payload, delays[0])
-        if (found := trials.with_other_axes(likely, ranked)) is not None:
-            return found
-    centre = None if given is None else edits.described_rotation(payload)
+    scans = Scans(stretch.lidar)
+    crossings = Crossings(scans, imu)
+    delays = _delays(scans, imu, crossings)
     # A head that nods in time with itself agrees with other delays as well: only the best is tried.
-    described = edits.with_axes(edits.with_latency(payload, delays[0]), ranked[0], np.eye(3))
-    middle = Rotation.identity() if centre is None else Rotation.from_matrix(centre)
-    for length, aside in ((GLANCE, Rotation.identity()), (LONG_GLANCE, ASIDE)):
-        if (found := trials.searched(described, middle * aside, length)) is not None:
+    likely = edits.with_latency(payload, delays[0])
+    descriptions = _Descriptions(likely, crossings, delays[0], _ranked_axes(imu))
+    described = None if given is None else edits.described_rotation(payload)
+    delayed = [edits.with_latency(payload, d) for d in descriptions.agreeing(described, delays)]
+    if described is not None:
+        tries = itertools.product(delayed[:LIKELY], (trials.as_described, trials.about))
+        if found := _first(tried(late) for late, tried in tries):
             return found
+        for gyro, accel in descriptions.of_axes(described):
+            if found := trials.at_a_glance(edits.with_axes(likely, gyro, accel)):
+                _require_one_meaning(gyro, accel)
+                return found
+    others = itertools.chain(descriptions.of_mounts(), delayed[LIKELY:])
+    if found := _first(trials.at_a_glance(other) for other in others):
+        return found
     raise NotFoundError(trials.failure)
 
 
-class _Trials:
-    """Tries descriptions on the richest part of a stretch."""
-
-    def __init__(self, stretch: Stretch, noise: ImuNoise, threads: int | None) -> None:
-        self._stretch, self._noise, self._threads = stretch, noise, threads
-        self._best: Trial | None = None
-
-    def consistent(self, payload: Payload, *, rotation: float) -> Payload | None:
-        """Return what a description has become if all fits together with it."""
-        trial = self._tried(payload, rotation, TRIED)
-        return _learned(payload, trial) if trial.is_consistent else None
-
-    def searched(self, payload: Payload, centre: Rotation, length: float) -> Payload | None:
-        """Look for the rotation of the lidar anywhere, nearest to `centre` first, by glances of a length, s."""
-        glances = []
-        for rotation in cover(centre):
-            turned = edits.with_rotation(payload, rotation.as_matrix())
-            glance = self._tried(turned, WIDE, length)
-            if glance.is_promising and (found := self._confirmed(payload, glance)) is not None:
-                return found
-            glances.append(glance)
-        glances = [glance for glance in glances if not glance.is_promising]
-        glances.sort(key=lambda glance: -glance.score)
-        confirmed = (self._confirmed(payload, glance) for glance in glances[:SECOND_GLANCES])
-        return next((found for found in confirmed if found is not None), None)
-
-    def with_other_axes(
-        self, payload: Payload, ranked: Sequence[NDArray[np.float64]]
-    ) -> Payload | None:
-        """Look for other axes of the gyro or of the accelerometer, then of both.
-
-        Raises
-        ------
-        NotFoundError
-            A 2D lidar sees the same with another mistake.
-        """
-        for gyro, accel in [*_of_one_sensor(ranked), *_of_both_sensors(ranked)]:
-            described = edits.with_axes(payload, gyro, accel)
-            glance = self._tried(described, CLOSE, GLANCE)
-            if glance.is_promising and (found := self._confirmed(described, glance)) is not None:
-                _require_one_meaning(gyro, accel)
-                return found
-        return None
-
-    def _confirmed(self, payload: Payload, glance: Trial) -> Payload | None:
-        """Return what a glance has learned if all fits together with it."""
-        if glance.calibration is None:
-            return None
-        # What it saw first was blurred by where it came from.
-        return self.consistent(_learned(payload, glance), rotation=CLOSE)
-
-    @property
-    def failure(self) -> str:
-        """Say how well the best description did."""
-        return "nothing that can be seen" if self._best is None else self._best.sentence
-
-    def _tried(self, payload: Payload, rotation: float, length: float) -> Trial:
-        wide = edits.with_std(
-            self._noise.at_least_in(payload),
-            extrinsic_rotation=rotation,
-            extrinsic_translation=UNKNOWN_SHIFT if rotation > AS_DESCRIBED else 0.0,
-            latency=UNKNOWN_LATENCY,
-        )
-        read = self._stretch.read_as(wide)
-        start, _ = richest(read.imu, TRIED)
-        trial = try_payload(read.part(start, start + length), wide, self._threads)
-        if self._best is None or trial.score > self._best.score:
-            self._best = trial
-        return trial
+def _first(found: Iterable[Payload | None]) -> Payload | None:
+    return next((payload for payload in found if payload is not None), None)
 
 
-def _learned(payload: Payload, trial: Trial) -> Payload:
-    """Return a payload with the rotation and the delay that a trial came to."""
-    assert trial.calibration is not None
-    mount = trial.calibration.mount
-    base = mount.T_imu_lidar if isinstance(mount, FixedMount) else mount.T_imu_motor
-    rotated = edits.with_rotation(payload, base.R)
-    return edits.with_latency(rotated, trial.calibration.source_latency)
+def _delays(scans: Scans, imu: ImuBatch, crossings: Crossings) -> list[float]:
+    """Return delays, s, the likeliest first, the one of clocks that agree among them."""
+    seen = delays_by_returns(scans, imu)
+    # A head that nods comes back after a period as well, but then its carrier has turned a little.
+    likely = [(cost * crossings.least(Reading(delay)), delay) for cost, delay in seen[:LIKELY]]
+    delays = [delay for _, delay in [*sorted(likely), *seen[LIKELY:]]]
+    return (
+        delays if any(abs(delay) < NEARBY for delay in delays) else [*delays[:1], 0.0, *delays[1:]]
+    )
+
+
+class _Descriptions:
+    """Descriptions that may hold by where the scans cross, the likeliest first.
+
+    Parameters
+    ----------
+    payload : with the delay, s, of the lidar
+    ranked : axes (3, 3) of the gyro relative to the accelerometer's
+
+    Raises
+    ------
+    NotFoundError
+        Any does.
+    """
+
+    def __init__(
+        self,
+        payload: Payload,
+        crossings: Crossings,
+        delay: float,
+        ranked: Sequence[NDArray[np.float64]],
+    ) -> None:
+        self._payload, self._crossings, self._ranked = payload, crossings, ranked
+        self._delay = delay
+        hand = round(np.linalg.det(ranked[0]))
+        self._mounts = crossings.mounts(Reading(delay, hand))
+        best = self._mounts[0][0]
+        if crossings.usual - best < TELLING:
+            raise NotFoundError(_ALIKE)
+        self._most = best + MAY_HOLD * (crossings.usual - best)
+
+    def agreeing(self, R: NDArray[np.float64] | None, delays: Sequence[float]) -> list[float]:
+        """Return the delays, s, with which a lidar may be mounted by R (3, 3); none without it."""
+        if R is None:
+            return []
+        return [d for d in delays if self._crossings.misfit(R, Reading(d)) <= self._most]
+
+    def of_axes(
+        self, R: NDArray[np.float64]
+    ) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+        """Yield axes (3, 3) of gyro and accelerometer for a lidar that is mounted by R (3, 3)."""
+        for gyro, accel in [*_of_one_sensor(self._ranked), *_of_both_sensors(self._ranked)]:
+            hand = round(np.linalg.det(gyro))
+            reading = Reading(self._delay, hand)
+            if self._crossings.misfit(hand * gyro.T @ R, reading) <= self._most:
+                yield gyro, accel
+
+    def of_mounts(self) -> Iterator[Payload]:
+        """Yield descriptions with other mounts, and the likeliest axes."""
+        gyro = self._ranked[0]
+        hand = round(np.linalg.det(gyro))
+        described = edits.with_axes(self._payload, gyro, np.eye(3))
+        for misfit, R in self._mounts:
+            if misfit <= self._most:
+                yield edits.with_rotation(described, hand * gyro @ R)
 
 
 def _require_one_meaning(gyro: NDArray[np.float64], accel: NDArray[np.float64]) -> None:
@@ -188,16 +175,6 @@ def _require_one_meaning(gyro: NDArray[np.float64], accel: NDArray[np.float64]) 
         raise NotFoundError(_POINT)
     if np.array_equal(gyro, -np.eye(3)) and np.array_equal(accel, np.eye(3)):
         raise NotFoundError(_PLANE)
-
-
-def richest(imu: ImuBatch, length: float) -> tuple[float, float]:
-    """Return start and end, s, of the part in which the head turns most."""
-    steps = np.linalg.norm(imu.gyro[1:], axis=1) * np.diff(imu.times)
-    turned = np.concatenate([[0.0], np.cumsum(steps)])
-    starts = np.arange(imu.times[0], max(imu.times[-1] - length, imu.times[0]) + 0.1, 0.5)
-    ahead = np.interp(starts + length, imu.times, turned) - np.interp(starts, imu.times, turned)
-    start = float(starts[int(np.argmax(ahead))])
-    return start, start + length
 
 
 def _ranked_axes(imu: ImuBatch) -> list[NDArray[np.float64]]:

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 from bentwing.base.mount import FixedMount
 from bentwing.calibrate.set_up import edits
 from bentwing.calibrate.set_up.noise import ImuNoise
-from bentwing.calibrate.set_up.planar import richest
 from bentwing.calibrate.set_up.spatial import NotFoundError
 from bentwing.calibrate.set_up.trial import try_payload
+from bentwing.calibrate.set_up.trials import richest
 from bentwing.recording.sections.section import Transform
 
 if TYPE_CHECKING:

@@ -12,32 +12,31 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing.base import geometry
+from bentwing.calibrate.set_up.scans import N_BEAMS, attitudes
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from bentwing.calibrate.set_up.stretch import Stretch
+    from bentwing.calibrate.set_up.scans import Scans
     from bentwing.recording import ImuBatch
 
-N_BEAMS = 120
-STEP = 0.01  # s between scans that are compared, at most the scan rate
 SHORTEST, LONGEST = 0.1, 2.0  # s until the head comes back
 LARGEST_DELAY = 3.0  # s
 BACK, AWAY = np.radians(4.0), np.radians(20.0)
 MOST_DIFFERENT = 0.5  # of the logarithm of a range: what comes into view counts no more
 FEWEST = 100
-CANDIDATES, NEARBY = 4, 0.15  # delays that are worth a trial, and s between them
+NEARBY = 0.15  # s between delays that are worth a trial
 
 
-def delays_by_returns(stretch: Stretch, imu: ImuBatch) -> list[float]:
-    """Return lidar stamps minus IMU clock, s: the likeliest delays, best first; none if motion tells none.
+def delays_by_returns(scans: Scans, imu: ImuBatch) -> list[tuple[float, float]]:
+    """Return what scans differ by and lidar stamps minus IMU clock, s, where they differ least around.
+
+    The likeliest comes first; none if motion tells none.
 
     Parameters
     ----------
     imu : rates in rad/s
     """
-    scans = _Scans(stretch)
     if len(scans.times) < FEWEST or len(imu.times) < FEWEST:
         return []
     first, later = _pairs(scans.times, imu)
@@ -45,52 +44,34 @@ def delays_by_returns(stretch: Stretch, imu: ImuBatch) -> list[float]:
         return []
     steps = round(LARGEST_DELAY / scans.interval)
     delays = np.arange(-steps, steps + 1)
-    costs = np.array([scans.difference(first + delay, later + delay) for delay in delays])
+    returns = _Returns(scans)
+    costs = np.array([returns.difference(first + delay, later + delay) for delay in delays])
     if np.isfinite(costs).sum() < len(costs) // 4:
         return []
-    return [
-        float(delays[i] * scans.interval) for i in _lowest(costs, round(NEARBY / scans.interval))
-    ]
+    lowest = _lowest(costs, round(NEARBY / scans.interval))
+    return [(float(costs[i]), float(delays[i] * scans.interval)) for i in lowest]
 
 
 def _lowest(costs: NDArray[np.float64], apart: int) -> list[int]:
     """Return the lowest minima, `apart` from each other."""
     left = np.where(np.isfinite(costs), costs, np.inf)
     found: list[int] = []
-    while len(found) < CANDIDATES and np.isfinite(left).any():
+    while np.isfinite(left).any():
         best = int(np.argmin(left))
         found.append(best)
         left[max(0, best - apart) : best + apart + 1] = np.inf
     return found
 
 
-class _Scans:
-    """Ranges by direction, for each scan.
+class _Returns:
+    """How much scans differ from later ones, by how much later those are."""
 
-    Attributes
-    ----------
-    times : (S,) s, middle of each scan, evenly spaced by `interval`
-    """
-
-    def __init__(self, stretch: Stretch) -> None:
-        lidar = stretch.lidar
-        points, times = lidar.points, lidar.times
-        azimuths = np.arctan2(points[:, 1], points[:, 0])
-        starts = np.concatenate([[0], np.flatnonzero(np.abs(np.diff(azimuths)) > 1.0) + 1])
-        ranges = np.log(np.maximum(np.linalg.norm(points, axis=1), 1e-3))
-        beams = np.floor((azimuths / (2 * np.pi) + 0.5) * N_BEAMS).astype(np.int64) % N_BEAMS
-        rows = np.repeat(np.arange(len(starts)), np.diff([*starts, len(times)]))
-        profiles = np.full((len(starts), N_BEAMS), np.nan, np.float32)
-        profiles[rows, beams] = ranges
-        middles = np.add.reduceat(times, starts) / np.diff([*starts, len(times)])
-        self.interval = max(STEP, float(np.median(np.diff(middles)))) if len(middles) > 1 else STEP
-        self.times = np.arange(middles[0], middles[-1], self.interval)
-        nearest = np.clip(np.searchsorted(middles, self.times), 0, len(middles) - 1)
-        self._profiles = profiles[nearest]
-        width = round(LONGEST / self.interval)
-        self._differences = np.full((len(self.times), width), np.nan, np.float32)
-        for lag in range(1, min(width, len(self.times))):
-            apart = np.abs(self._profiles[lag:] - self._profiles[:-lag])
+    def __init__(self, scans: Scans) -> None:
+        self._n = len(scans.times)
+        width = round(LONGEST / scans.interval)
+        self._differences = np.full((self._n, width), np.nan, np.float32)
+        for lag in range(1, min(width, self._n)):
+            apart = np.abs(scans.ranges[lag:] - scans.ranges[:-lag])
             seen = np.isfinite(apart)
             total = np.where(seen, np.minimum(apart, MOST_DIFFERENT), 0.0).sum(axis=1)
             count = seen.sum(axis=1)
@@ -103,7 +84,7 @@ class _Scans:
 
     def difference(self, first: NDArray[np.intp], later: NDArray[np.intp]) -> float:
         """Return how much scans differ from later ones (K,), in units of what is usual there."""
-        inside = (first >= 0) & (later < len(self.times))
+        inside = (first >= 0) & (later < self._n)
         if inside.sum() < FEWEST:
             return float("nan")
         apart = self._differences[first[inside], (later - first)[inside]]
@@ -116,7 +97,8 @@ class _Scans:
 
 def _pairs(times: NDArray[np.float64], imu: ImuBatch) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return the numbers of times (S,) between which the head turned away and came back."""
-    quats = _attitudes(times, imu)
+    nearest = np.clip(np.searchsorted(imu.times, times), 0, len(imu.times) - 1)
+    quats = attitudes(imu)[nearest]
     inside = np.flatnonzero((times >= imu.times[0]) & (times <= imu.times[-1]))
     if len(inside) < 2:
         return np.zeros(0, np.intp), np.zeros(0, np.intp)
@@ -131,18 +113,6 @@ def _pairs(times: NDArray[np.float64], imu: ImuBatch) -> tuple[NDArray[np.intp],
         found.append((chosen, chosen + lag))
     first, later = (np.concatenate(part) for part in zip(*found, strict=True))
     return first, later
-
-
-def _attitudes(times: NDArray[np.float64], imu: ImuBatch) -> NDArray[np.float64]:
-    """Return the attitude (S, 4) at times (S,) by the gyro alone."""
-    mid = (imu.gyro[1:] + imu.gyro[:-1]) / 2 * np.diff(imu.times)[:, None]
-    quats = np.vstack([[0.0, 0.0, 0.0, 1.0], geometry.exp(mid)])
-    width = 1
-    while width < len(quats):  # products of all that came before, by doubling
-        quats[width:] = geometry.multiply(quats[:-width], quats[width:])
-        width *= 2
-    nearest = np.clip(np.searchsorted(imu.times, times), 0, len(quats) - 1)
-    return np.asarray(quats[nearest])
 
 
 def _angle(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:

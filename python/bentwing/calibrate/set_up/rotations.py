@@ -3,22 +3,22 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-# Every rotation is within 45° of one of the 60 that leave an icosahedron as it is.
-COVERED = np.radians(45.0)
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+# Alexa, Super-Fibonacci spirals (CVPR 2022): the positive root of x⁴ = x + 4.
+_PSI = 1.533751168755204288118041
 
 
-def cover(centre: Rotation, *, nearest_first: bool = True) -> list[Rotation]:
-    """Return 60 rotations, `centre` among them, no rotation farther than `COVERED` from all of them.
-
-    Parameters
-    ----------
-    nearest_first : order them by their angle to `centre`
-    """
-    around = Rotation.create_group("I")
-    turned = [centre * Rotation.from_quat(quat) for quat in around.as_quat()]
-    if nearest_first:
-        turned.sort(key=lambda rotation: float((centre.inv() * rotation).magnitude()))
-    return turned
+def spread(n: int) -> NDArray[np.float64]:
+    """Return n rotations (n, 3, 3), evenly spread over all there are."""
+    s = np.arange(n) + 0.5
+    inner, outer = np.sqrt(s / n), np.sqrt(1.0 - s / n)
+    a, b = 2 * np.pi * s / np.sqrt(2.0), 2 * np.pi * s / _PSI
+    quats = [inner * np.sin(a), inner * np.cos(a), outer * np.sin(b), outer * np.cos(b)]
+    return np.asarray(Rotation.from_quat(np.column_stack(quats)).as_matrix())

@@ -36,9 +36,11 @@ class Stretch:
     Attributes
     ----------
     batches : in the order of the recording, the lidar's thinned
+    imu_offset : s, what has been added to the stamps of the IMU
     """
 
     batches: tuple[Batch, ...]
+    imu_offset: float = 0.0
 
     @property
     def imu(self) -> ImuBatch:
@@ -82,16 +84,18 @@ class Stretch:
                     batches.append(EncoderBatch(angles.times[part], angles.angles[part]))
                 first = max(first, last)
             batches.append(batch)
-        return Stretch(tuple(batches))
+        return replace(self, batches=tuple(batches))
 
     @property
     def without_imu(self) -> Stretch:
         """The same without inertial samples."""
-        return Stretch(tuple(b for b in self.batches if not isinstance(b, ImuBatch)))
+        return replace(self, batches=tuple(b for b in self.batches if not isinstance(b, ImuBatch)))
 
     def read_as(self, payload: Payload) -> Stretch:
         """Return the samples as a payload reads those that drivers give, the encoder's apart."""
         lidar, imu = LidarReading.of(payload.lidar), ImuReading.of(payload.imu)
+        offset = _imu_offset(payload)
+        later = offset - self.imu_offset
 
         def read(batch: Batch) -> Batch:
             if isinstance(batch, LidarBatch):
@@ -100,14 +104,17 @@ class Stretch:
             if isinstance(batch, EncoderBatch):
                 return replace(batch, times=batch.times - payload.lidar.latency_read)
             gyro, accel = imu.gyro.vectors(batch.gyro), imu.accel.vectors(batch.accel)
-            return replace(batch, gyro=gyro, accel=accel)
+            return replace(batch, times=batch.times + later, gyro=gyro, accel=accel)
 
-        return Stretch(tuple(read(batch) for batch in self.batches))
+        batches = [read(batch) for batch in self.batches]
+        if later:
+            batches.sort(key=lambda batch: batch.times[0])
+        return Stretch(tuple(batches), offset)
 
     def part(self, start: float, stop: float) -> Stretch:
         """Return what lies in `[start, stop)`, s, with a little more of the motor and the IMU."""
         parts = (_trimmed(batch, start, stop) for batch in self.batches)
-        return Stretch(tuple(part for part in parts if len(part.times)))
+        return replace(self, batches=tuple(part for part in parts if len(part.times)))
 
     def preprocessed(self, payload: Payload) -> Iterator[Batch]:
         """Yield the batches as an estimator takes them."""
@@ -118,8 +125,17 @@ def read_stretch(recording: Recording, length: float = LENGTH) -> Stretch:
     """Read the first seconds in which the IMU moves; without an IMU the first seconds."""
     start = max(0.0, _first_motion(recording) - BEFORE_MOTION)
     thinning = _Thinning()
-    batches = recording.batches(start or None, length)
-    return Stretch(tuple(thinning.thinned(b) if isinstance(b, LidarBatch) else b for b in batches))
+    batches = [
+        thinning.thinned(batch) if isinstance(batch, LidarBatch) else batch
+        for batch in recording.batches(start or None, length)
+    ]
+    return Stretch(
+        tuple(batch for batch in batches if len(batch.times)), _imu_offset(recording.payload)
+    )
+
+
+def _imu_offset(payload: Payload) -> float:
+    return 0.0 if payload.imu is None else payload.imu.clock_offset
 
 
 def _first_motion(recording: Recording) -> float:

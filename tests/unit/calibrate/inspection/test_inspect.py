@@ -107,7 +107,8 @@ def test_a_file_that_is_no_recording_is_an_error(tmp_path):
         inspect(path)
 
 
-def test_a_mount_that_no_payload_tells_is_said_with_its_line(tmp_path, ros1):
+def test_no_mount_is_made_up_where_all_looks_alike(tmp_path, ros1):
+    # The same range everywhere and always.
     found = inspect(ros1.write(tmp_path / "a.bag", with_rest(ros1)), Payload(imu={}))
-    lines = {finding.kind: finding.line for finding in found.set_up.findings}
-    assert lines["mount"].startswith("T_imu_lidar: ")
+    assert not found.set_up.findings
+    assert "fits together in any mount" in found.set_up.doubt

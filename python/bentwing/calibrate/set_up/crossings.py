@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""How a 2D lidar is mounted, from where the planes of its scans cross.
+
+Two scans that are taken shortly after each other from about the same place see the same along the line
+in which their planes cross. The gyro says how the head has turned between them, and the mount where in
+each scan that line lies: only with the right mount are both ranges the same.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.optimize import minimize
+from scipy.spatial.transform import Rotation
+
+from bentwing.base import geometry
+from bentwing.calibrate.set_up.rotations import spread
+from bentwing.calibrate.set_up.scans import attitudes, beams
+from bentwing.recording.batches import ImuBatch
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from bentwing.calibrate.set_up.scans import Scans
+
+PAIRS, LONGEST = 2000, 0.6  # of scans that are compared, and s between them
+ACROSS = np.sin(np.radians(10.0))  # planes that cross at a smaller angle tell nothing
+MOST_DIFFERENT = 0.5  # of the logarithm of a range: what one scan does not see counts no more
+FEWEST = 200  # crossings; what fewer say is moved towards what is usual
+COARSE, REFINED = 1000, 24  # rotations that are compared, and the best of them
+APART = np.radians(15.0)  # between mounts that are told apart
+STEPS = np.radians(8.0)  # in which a rotation is refined first
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """How the rates of the gyro are read.
+
+    Attributes
+    ----------
+    delay : s, lidar stamps minus IMU clock
+    hand : 1, or -1 where all rates are negated
+    scale : what the gyro shows of a turn
+    """
+
+    delay: float = 0.0
+    hand: int = 1
+    scale: float = 1.0
+
+
+class Crossings:
+    """Pairs of scans, in how far they agree where their planes cross.
+
+    Parameters
+    ----------
+    imu : as it was given, rates in rad/s
+    """
+
+    def __init__(self, scans: Scans, imu: ImuBatch) -> None:
+        self._scans, self._imu = scans, imu
+        random = np.random.default_rng(0)
+        lags = max(2, round(LONGEST / scans.interval))
+        first = random.integers(0, len(scans.times), PAIRS)
+        later = first + random.integers(1, lags, PAIRS)
+        inside = later < len(scans.times)
+        self._first, self._later = first[inside], later[inside]
+        self._attitudes = lru_cache(8)(self._attitudes_by)
+        self.usual = 0.0
+        rates = [self.misfit(R) for R in spread(50)]
+        self.usual = float(np.median(rates))
+
+    def misfit(self, R: NDArray[np.float64], reading: Reading = Reading()) -> float:
+        """Return the mean difference of the logarithms of ranges; R (3, 3) leads from the lidar to the gyro."""
+        A = self._attitudes(reading)
+        frames = A @ R
+        first, later = frames[self._first], frames[self._later]
+        lines = np.cross(first[:, :, 2], later[:, :, 2])
+        lengths = np.linalg.norm(lines, axis=1)
+        crosses = lengths > ACROSS
+        total, count = 0.0, 0
+        a = np.einsum("kab,ka->kb", first[crosses], lines[crosses])
+        b = np.einsum("kab,ka->kb", later[crosses], lines[crosses])
+        ranges = self._scans.ranges
+        for sign in (1.0, -1.0):
+            seen = ranges[self._first[crosses], beams(np.arctan2(sign * a[:, 1], sign * a[:, 0]))]
+            again = ranges[self._later[crosses], beams(np.arctan2(sign * b[:, 1], sign * b[:, 0]))]
+            apart = np.minimum(np.abs(seen - again), MOST_DIFFERENT)
+            known = np.isfinite(apart)
+            total += float(apart[known].sum())
+            count += int(known.sum())
+        return (total + FEWEST * self.usual) / (count + FEWEST)
+
+    def mounts(self, reading: Reading) -> list[tuple[float, NDArray[np.float64]]]:
+        """Return misfits and rotations (3, 3) where the misfit is least around, best first."""
+        refined = self._best(reading, COARSE, REFINED)
+        found: list[tuple[float, NDArray[np.float64]]] = []
+        for misfit, R in refined:
+            if all(_angle(R, other) > APART for _, other in found):
+                found.append((misfit, R))
+        return found
+
+    def least(self, reading: Reading) -> float:
+        """Return the misfit of the best rotation, at a glance."""
+        return self._best(reading, COARSE // 4, REFINED // 6)[0][0]
+
+    def _best(
+        self, reading: Reading, n: int, n_refined: int
+    ) -> list[tuple[float, NDArray[np.float64]]]:
+        """Return misfits and rotations (3, 3): the best of n, refined, best first."""
+        coarse = sorted(((self.misfit(R, reading), R) for R in spread(n)), key=_first)
+        return sorted((self._refined(R, reading) for _, R in coarse[:n_refined]), key=_first)
+
+    def _refined(
+        self, R: NDArray[np.float64], reading: Reading
+    ) -> tuple[float, NDArray[np.float64]]:
+        def turned(vector: NDArray[np.float64]) -> NDArray[np.float64]:
+            return np.asarray(Rotation.from_rotvec(vector).as_matrix() @ R)
+
+        simplex = STEPS * np.vstack([np.zeros(3), np.eye(3)])
+        options = {"initial_simplex": simplex, "maxfev": 50, "xatol": 1e-2, "fatol": 1e-4}
+        best = minimize(
+            lambda v: self.misfit(turned(v), reading),
+            np.zeros(3),
+            method="Nelder-Mead",
+            options=options,
+        )
+        return float(best.fun), turned(best.x)
+
+    def _attitudes_by(self, reading: Reading) -> NDArray[np.float64]:
+        rates = reading.hand / reading.scale * self._imu.gyro
+        quats = attitudes(ImuBatch(self._imu.times, rates, self._imu.accel))
+        times = self._scans.times - reading.delay
+        nearest = np.clip(np.searchsorted(self._imu.times, times), 0, len(quats) - 1)
+        return geometry.to_matrices(quats[nearest])
+
+
+def _first(pair: tuple[float, NDArray[np.float64]]) -> float:
+    return pair[0]
+
+
+def _angle(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
+    return float(np.arccos(np.clip((np.trace(a.T @ b) - 1.0) / 2.0, -1.0, 1.0)))

@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""Try descriptions of a head one after the other, first at a glance."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bentwing.base.mount import FixedMount
+from bentwing.calibrate.set_up import edits
+from bentwing.calibrate.set_up.trial import try_payload
+
+if TYPE_CHECKING:
+    from bentwing.calibrate.set_up.noise import ImuNoise
+    from bentwing.calibrate.set_up.stretch import Stretch
+    from bentwing.calibrate.set_up.trial import Trial
+    from bentwing.recording import ImuBatch, Payload
+
+TRIED, GLANCE = 6.0, 3.0  # s of the richest motion on which descriptions are tried, and first seen
+AS_DESCRIBED = 0.02  # rad, std of a rotation that may hold
+CLOSE = 0.2  # rad, std of a rotation that is about right
+UNKNOWN_LATENCY = 0.02  # s, std once it was found
+UNKNOWN_SHIFT = 0.1  # m, std where no mount is described
+
+
+class Trials:
+    """Tries descriptions on the richest part of a stretch.
+
+    Parameters
+    ----------
+    has_mount : whether the shift of the lidar on the IMU is described
+    """
+
+    def __init__(
+        self, stretch: Stretch, noise: ImuNoise, *, has_mount: bool, threads: int | None
+    ) -> None:
+        self._stretch, self._noise, self._threads = stretch, noise, threads
+        self._has_mount = has_mount
+        self._best: Trial | None = None
+
+    def as_described(self, payload: Payload) -> Payload | None:
+        """Return what a description has become if all fits together with it and it hardly changes."""
+        return self._consistent(payload, AS_DESCRIBED)
+
+    def about(self, payload: Payload) -> Payload | None:
+        """Return what a description has become if all fits together with it, its rotation about right."""
+        return self._consistent(payload, CLOSE)
+
+    def at_a_glance(self, payload: Payload) -> Payload | None:
+        """Return the same, for one that most likely does not fit."""
+        glance = self._tried(payload, CLOSE, GLANCE)
+        if not glance.is_promising:
+            return None
+        # What it saw first was blurred by where it came from, and may still have been the second time.
+        again = self._tried(self._learned(payload, glance), CLOSE, TRIED)
+        if again.is_promising and not again.is_consistent:
+            again = self._tried(self._learned(payload, again), CLOSE, TRIED)
+        return self._learned(payload, again) if again.is_consistent else None
+
+    @property
+    def failure(self) -> str:
+        """Say how well the best description did."""
+        return "nothing that can be seen" if self._best is None else self._best.sentence
+
+    def _consistent(self, payload: Payload, rotation: float) -> Payload | None:
+        trial = self._tried(payload, rotation, TRIED)
+        return self._learned(payload, trial) if trial.is_consistent else None
+
+    def _learned(self, payload: Payload, trial: Trial) -> Payload:
+        """Return a payload with the delay and what a trial has told of the mount."""
+        assert trial.calibration is not None
+        mount = trial.calibration.mount
+        base = mount.T_imu_lidar if isinstance(mount, FixedMount) else mount.T_imu_motor
+        placed = edits.with_rotation(payload, base.R)
+        if not self._has_mount:
+            placed = edits.with_shift(placed, base.translation)
+        return edits.with_latency(placed, trial.calibration.source_latency)
+
+    def _tried(self, payload: Payload, rotation: float, length: float) -> Trial:
+        wide = edits.with_std(
+            self._noise.at_least_in(payload),
+            extrinsic_rotation=rotation,
+            extrinsic_translation=UNKNOWN_SHIFT if rotation > AS_DESCRIBED else 0.0,
+            latency=UNKNOWN_LATENCY,
+        )
+        read = self._stretch.read_as(wide)
+        start, _ = richest(read.imu, TRIED)
+        trial = try_payload(read.part(start, start + length), wide, self._threads)
+        if self._best is None or trial.score > self._best.score:
+            self._best = trial
+        return trial
+
+
+def richest(imu: ImuBatch, length: float) -> tuple[float, float]:
+    """Return start and end, s, of the part in which the head turns most."""
+    steps = np.linalg.norm(imu.gyro[1:], axis=1) * np.diff(imu.times)
+    turned = np.concatenate([[0.0], np.cumsum(steps)])
+    starts = np.arange(imu.times[0], max(imu.times[-1] - length, imu.times[0]) + 0.1, 0.5)
+    ahead = np.interp(starts + length, imu.times, turned) - np.interp(starts, imu.times, turned)
+    start = float(starts[int(np.argmax(ahead))])
+    return start, start + length

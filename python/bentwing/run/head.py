@@ -104,7 +104,10 @@ class Head:
     def found(self) -> SetUp:
         """Return the head as the recording shows it; takes some seconds, of a 2D lidar up to a minute."""
         self._progress.note("looking for the set-up of the sensor head in the recording")
-        return find_set_up(self.paths, self.settings.payload, self.settings.threads)
+        settings = self.settings
+        return find_set_up(
+            self.paths, settings.payload, settings.threads, after=settings.start or 0.0
+        )
 
     def use(self, set_up: SetUp) -> None:
         """Read the recording by a set-up that was found, and say what it is."""

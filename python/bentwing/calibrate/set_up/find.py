@@ -34,13 +34,16 @@ LEAST_TURNING, STEP = 2.0, 0.5  # s, and s over which rates are averaged
 LOOKED_AT = 5000  # points that tell a 2D lidar from a 3D one
 
 
-def find_set_up(paths: Sequence[Path], payload: Payload, threads: int | None = None) -> SetUp:
+def find_set_up(
+    paths: Sequence[Path], payload: Payload, threads: int | None = None, *, after: float = 0.0
+) -> SetUp:
     """Return the head as its recording shows it.
 
     Parameters
     ----------
     paths : consecutive parts of one recording
     payload : the description to begin with; what holds of it is kept
+    after : s from the beginning of the recording that are not looked at
 
     Returns
     -------
@@ -53,7 +56,7 @@ def find_set_up(paths: Sequence[Path], payload: Payload, threads: int | None = N
         The recording cannot be read.
     """
     try:
-        found = _Search(paths, payload, threads).found()
+        found = _Search(paths, payload, after, threads).found()
     except NotFoundError as error:
         return SetUp(payload, doubt=str(error))
     findings = findings_between(payload, found)
@@ -65,10 +68,12 @@ class _Search:
 
     Parameters
     ----------
-    paths, payload, threads : as of `find_set_up`
+    paths, payload, after, threads : as of `find_set_up`
     """
 
-    def __init__(self, paths: Sequence[Path], payload: Payload, threads: int | None) -> None:
+    def __init__(
+        self, paths: Sequence[Path], payload: Payload, after: float, threads: int | None
+    ) -> None:
         self._paths, self._threads = paths, threads
         self._given = payload
         self._has_mount = payload.places_lidar_on_imu
@@ -76,7 +81,7 @@ class _Search:
         with Recording(paths, self._start, strict=False) as recording:
             self._start = _with_clocks(recording, self._start)
         with Recording(paths, self._start, strict=False) as recording:
-            self._stretch = read_stretch(recording)
+            self._stretch = read_stretch(recording, after)
             self._imu = recording.imu_topic
             self._encoder = None if payload.encoder is None else recording.encoder_topic
 

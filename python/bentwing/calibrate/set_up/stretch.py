@@ -121,13 +121,13 @@ class Stretch:
         return preprocess(iter(self.batches), payload, Counter())
 
 
-def read_stretch(recording: Recording, length: float = LENGTH) -> Stretch:
-    """Read the first seconds in which the IMU moves; without an IMU the first seconds."""
-    start = max(0.0, _first_motion(recording) - BEFORE_MOTION)
+def read_stretch(recording: Recording, after: float = 0.0) -> Stretch:
+    """Read the first seconds in which the IMU moves, after some; without an IMU the first seconds."""
+    start = max(after, _first_motion(recording, after) - BEFORE_MOTION)
     thinning = _Thinning()
     batches = [
         thinning.thinned(batch) if isinstance(batch, LidarBatch) else batch
-        for batch in recording.batches(start or None, length)
+        for batch in recording.batches(start or None, LENGTH)
     ]
     return Stretch(
         tuple(batch for batch in batches if len(batch.times)), _imu_offset(recording.payload)
@@ -138,15 +138,17 @@ def _imu_offset(payload: Payload) -> float:
     return 0.0 if payload.imu is None else payload.imu.clock_offset
 
 
-def _first_motion(recording: Recording) -> float:
-    times, gyro, accel = imu_units.collect(recording.imu_batches(), SEARCHED)
+def _first_motion(recording: Recording, after: float) -> float:
+    samples = imu_units.collect(recording.imu_batches(), after + SEARCHED)
+    later = samples[0] >= after
+    times, gyro, accel = (values[later] for values in samples)
     if len(times) < imu_units.MIN_SAMPLES:
-        return 0.0
+        return after
     n = int(np.searchsorted(times, times[0] + imu_units.CHECKED))
     rates = gyro * imu_units.gyro_scale(times[:n], gyro[:n], accel[:n])
     resting = np.median(rates[times < times[0] + 0.5], axis=0)
     moves = np.linalg.norm(rates - resting, axis=1) > MOVING
-    return float(times[int(np.argmax(moves))]) if moves.any() else 0.0
+    return float(times[int(np.argmax(moves))]) if moves.any() else after
 
 
 class _Thinning:

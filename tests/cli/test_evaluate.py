@@ -183,7 +183,7 @@ def test_wrong_usage_ends_with_2(bentwing, run_folder, monkeypatch, arguments, s
 @pytest.mark.parametrize(
     ("option", "name", "content", "says"),
     [
-        ("--reference-trajectory", "kitti.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n", "expected `t x y z"),
+        ("--reference-trajectory", "kitti.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n", "as KITTI writes"),
         ("--reference-trajectory", "missing.txt", None, "not readable"),
         ("--reference-map", "scan.xyz", "0 0 0\n", "convert it first"),
         ("--reference-map", "cut.ply", "ply\nformat ascii 1.0\n", "no end"),

@@ -18,7 +18,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 _POSE_COLUMNS = 8
+_KITTI_COLUMNS = 12
 _LATEST_NS = 2**62  # beyond it differences of stamps overflow
+_LARGEST_EXPONENT = 30  # of ten, of a stamp in any unit; times the nanosecond's 0 it is 0
+_MOST_BYTES = 2**30
 
 
 def write_poses(
@@ -70,7 +73,30 @@ def read_poses(path: Path) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
 def read_stamped_rows(
     path: Path, widths: tuple[int, ...], layout: str, *, ignore_more: bool = False
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Read lines of a stamp in seconds and numbers; commas count as spaces, # begins a comment.
+    """Read lines of a stamp in seconds and numbers, as `read_rows` does; the stamps increase.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, a line has another form, or the stamps do not increase.
+    """
+    stamps, values = read_rows(path, widths, layout, ignore_more=ignore_more)
+    late = np.diff(stamps) <= 0
+    if late.any():
+        msg = f"{path}: stamps must increase, pose {int(np.argmax(late)) + 2} does not"
+        raise InputError(msg)
+    return stamps, values
+
+
+def read_rows(
+    path: Path,
+    widths: tuple[int, ...],
+    layout: str,
+    *,
+    ignore_more: bool = False,
+    per_second: int = 1,
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Read lines of a stamp and numbers; commas count as spaces, # begins a comment.
 
     A first line that names the columns (`t,x,y,z`) is left out.
 
@@ -80,35 +106,37 @@ def read_stamped_rows(
     widths : numbers of columns, stamp included, of which all lines have one
     layout : names the columns in the messages
     ignore_more : leave out columns beyond the widest
+    per_second : units of the stamps in a second
 
     Returns
     -------
-    stamps_ns : (N,) int64, increasing, N > 0
+    stamps_ns : (N,) int64, N > 0
     values : (N, width - 1) float64
 
     Raises
     ------
     InputError
-        If the file cannot be read, a line has another form, or the stamps do not increase.
+        If the file cannot be read, or a line has another form.
     """
-    try:
-        lines = path.read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        msg = f"{path}: not readable as a trajectory ({error})"
-        raise InputError(msg) from error
     stamps_ns: list[int] = []
     rows: list[list[float]] = []
-    for number, line in enumerate(lines, start=1):
+    for number, line in enumerate(read_lines(path), start=1):
         fields = line.replace(",", " ").split()
         if not fields or fields[0].startswith("#") or (not rows and _is_heading(fields)):
             continue
+        if len(fields) == _KITTI_COLUMNS and len(fields) not in widths:
+            msg = (
+                f"{path}, line {number}: {_KITTI_COLUMNS} columns are poses as KITTI writes them, "
+                f"without times; write lines of `{layout}`"
+            )
+            raise InputError(msg)
         fields = fields[: max(widths)] if ignore_more else fields
         expected = (len(rows[0]) + 1,) if rows else widths
         try:
-            stamps_ns.append(int((Decimal(fields[0]) * NS_PER_S).to_integral_value()))
+            stamps_ns.append(_stamp_ns(fields[0], NS_PER_S // per_second))
             rows.append([float(value) for value in fields[1:]])
-            complete = len(fields) in expected and abs(stamps_ns[-1]) < _LATEST_NS
-        except (InvalidOperation, ValueError, OverflowError):
+            complete = len(fields) in expected
+        except (InvalidOperation, ValueError):
             complete = False
         if not complete:
             msg = f"{path}, line {number}: expected `{layout}`, found {line[:80]!r}"
@@ -116,12 +144,56 @@ def read_stamped_rows(
     if not stamps_ns:
         msg = f"{path}: holds no pose; expected lines of `{layout}`"
         raise InputError(msg)
-    stamps = np.array(stamps_ns, dtype=np.int64)
-    late = np.diff(stamps) <= 0
-    if late.any():
-        msg = f"{path}: stamps must increase, pose {int(np.argmax(late)) + 2} does not"
+    return np.array(stamps_ns, dtype=np.int64), np.array(rows)
+
+
+def read_lines(path: Path) -> list[str]:
+    """Return the lines of a text file.
+
+    Raises
+    ------
+    InputError
+        If it is no file of text, or too large to be one of poses.
+    """
+    require_file(path)
+    try:
+        return path.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        msg = f"{path}: not readable as a trajectory ({error})"
+        raise InputError(msg) from error
+
+
+def require_file(path: Path) -> None:
+    """Refuse what is no file, as a device or a pipe, or too large to hold poses.
+
+    Raises
+    ------
+    InputError
+    """
+    if path.exists() and not path.is_file():
+        msg = f"{path}: is not a file"
         raise InputError(msg)
-    return stamps, np.array(rows)
+    if path.exists() and (size := path.stat().st_size) > _MOST_BYTES:
+        msg = f"{path}: has {size} bytes, more than any trajectory"
+        raise InputError(msg)
+
+
+def _stamp_ns(text: str, unit_ns: int) -> int:
+    """Return a stamp in ns, exact to the digit.
+
+    Raises
+    ------
+    ValueError, InvalidOperation
+        It is no number, or none that a clock shows.
+    """
+    stamp = Decimal(text)
+    # Before any arithmetic, as a large exponent takes minutes.
+    if not stamp.is_finite() or abs(stamp.adjusted()) > _LARGEST_EXPONENT:
+        raise ValueError
+    stamp_ns = int((stamp * unit_ns).to_integral_value())
+    if abs(stamp_ns) >= _LATEST_NS:
+        raise ValueError
+    return stamp_ns
 
 
 def _is_heading(fields: list[str]) -> bool:

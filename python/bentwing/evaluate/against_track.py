@@ -12,7 +12,13 @@ from bentwing.base import geometry
 from bentwing.base.clock import NS_PER_S
 from bentwing.base.errors import InputError
 from bentwing.base.trajectory import Trajectory
-from bentwing.evaluate.alignment import Alignment, align, without_frame_rotation
+from bentwing.evaluate.alignment import (
+    Alignment,
+    align,
+    align_poses,
+    tells_roll,
+    without_frame_rotation,
+)
 from bentwing.evaluate.relative import (
     RelativeError,
     relative_pose_error,
@@ -33,6 +39,7 @@ if TYPE_CHECKING:
 DELTAS = (1.0, 10.0)  # m, over which relative errors are measured
 _SPEED_SPAN = 0.2  # s over which a speed is measured, so that vibration does not count
 _FEWEST = 3
+_LEAST_CHANGE = 0.05  # of a speed
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +73,7 @@ class TrackError:
     rte, rre : of Tazir 2020, with the first poses aligned, m and √2 rad; None likewise
     n_unmatched : measurements outside of the common time or in a silence
     alignment : from the map of the estimate to the frame of the reference
+    is_straight : the positions do not tell the turn about the path
     times, errors, speeds : (N,) s since the estimate's time zero, (N, 3) m, (N,) m/s
     estimate, reference : at the common times, the estimate aligned; reference None like `rotation`
     """
@@ -79,6 +87,7 @@ class TrackError:
     rte: Statistics | None
     rre: Statistics | None
     n_unmatched: int
+    is_straight: bool
     alignment: Alignment = field(metadata=SAMPLES)
     times: NDArray[np.float64] = field(metadata=SAMPLES)
     errors: NDArray[np.float64] = field(metadata=SAMPLES)
@@ -121,21 +130,26 @@ def compare_with_track(
     matched, positions, quats, n_unmatched = _at_common_times(
         moved_to_point(estimate, point.lever_arm), track.moved_in_time(shift)
     )
-    alignment = align(matched.positions, positions)
+    reference = None if quats is None else Trajectory(matched.times, positions, quats)
+    alignment = (
+        align(matched.positions, positions)
+        if reference is None
+        else align_poses(matched, reference)
+    )
     errors = alignment.apply(matched).positions - positions
     distances = np.linalg.norm(errors, axis=1)
     speeds = _speeds(estimate, matched.times)
     relative = [relative_pose_error(matched, positions, quats, delta) for delta in DELTAS]
-    reference = None if quats is None else Trajectory(matched.times, positions, quats)
     return TrackError(
         tracked_point=point,
         absolute=Statistics.of(distances),
         axes={name: Box.of(errors[:, i]) for i, name in enumerate("xyz")},
-        error_over_speed=fit_line(speeds, distances),
+        error_over_speed=fit_line(speeds, distances) if _varies(speeds) else None,
         relative=[found for found in relative if found is not None],
         rotation=None if reference is None else _rotation(alignment.apply(matched), reference),
         **_errors_of_tazir(matched, reference),
         n_unmatched=n_unmatched,
+        is_straight=not tells_roll(alignment, matched.positions, positions),
         alignment=alignment,
         times=matched.times,
         errors=errors,
@@ -176,6 +190,12 @@ def _speeds(estimate: Trajectory, times: NDArray[np.float64]) -> NDArray[np.floa
     moved = estimate.interpolate(end)[0] - estimate.interpolate(begin)[0]
     speeds: NDArray[np.float64] = np.linalg.norm(moved, axis=1) / (end - begin)
     return speeds
+
+
+def _varies(speeds: NDArray[np.float64]) -> bool:
+    """Whether speeds (N,) differ enough to set errors against them."""
+    low, high = np.percentile(speeds, [5, 95])
+    return bool(high - low > _LEAST_CHANGE * high)
 
 
 def _rotation(aligned: Trajectory, reference: Trajectory) -> RotationError:

@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 
 _FEWEST = 3  # poses that fix an alignment
 
+_ROLL_TOLD = 0.035  # rad; a turn about the path that is less certain is not taken from positions
+_LEAST_OFF = 1e-4  # m
+
 
 @dataclass(frozen=True, slots=True)
 class Alignment:
@@ -91,6 +94,40 @@ def align(
         mirror = np.diag([1.0, 1.0, np.sign(np.linalg.det(u) * np.linalg.det(vt))])
         R = u @ mirror @ vt
     return Alignment(R, targets.mean(axis=0) - R @ points.mean(axis=0))
+
+
+def align_poses(estimate: Trajectory, truth: Trajectory) -> Alignment:
+    """Align positions as `align` does, with the turn about a straight path from the orientations.
+
+    Parameters
+    ----------
+    estimate, truth : at the same times
+    """
+    alignment = align(estimate.positions, truth.positions)
+    if tells_roll(alignment, estimate.positions, truth.positions):
+        return alignment
+    axis = _path(truth.positions)[1]
+    aligned = alignment.apply(estimate)
+    turns = geometry.multiply(truth.quats_xyzw, geometry.inverse(aligned.quats_xyzw))
+    # Of each turn the part about the axis; squared, as q and -q are one rotation.
+    parts = (turns[:, 3] + 1j * (turns[:, :3] @ axis)) ** 2
+    roll = geometry.to_matrices(geometry.exp(float(np.angle(parts.sum())) * axis))
+    R = roll @ alignment.R
+    return Alignment(R, truth.positions.mean(axis=0) - R @ estimate.positions.mean(axis=0))
+
+
+def tells_roll(
+    alignment: Alignment, points: NDArray[np.float64], targets: NDArray[np.float64]
+) -> bool:
+    """Whether positions (N, 3) tell the turn about the path: it bends by much more than they are off."""
+    off = float(np.sqrt(((alignment.put(points) - targets) ** 2).sum(axis=1).mean()))
+    return max(off, _LEAST_OFF) < _ROLL_TOLD * _path(targets)[0]
+
+
+def _path(positions: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
+    """Return how far a path (N, 3) bends, m, and its main direction (3,)."""
+    _, extents, axes = np.linalg.svd(positions - positions.mean(axis=0), full_matrices=False)
+    return float(extents[1] / np.sqrt(len(positions))), axes[0]
 
 
 def position_error(points: NDArray[np.float64], targets: NDArray[np.float64]) -> float:

@@ -137,13 +137,27 @@ def _trajectory(
     odometry = None if subject.odometry is None else read_tum(subject.odometry, origin_ns)[0]
     if question.reference_trajectory is not None:
         with progress.stage("comparing the trajectory with the reference"):
+            reference = read_track(question.reference_trajectory)
+            if reference.n_repeats:
+                result.notes.append(
+                    f"{reference.n_repeats} of the reference's measurements repeat a stamp and are left out"
+                )
             result.trajectory = compare_with_track(
                 estimate,
                 origin_ns,
-                read_track(question.reference_trajectory),
+                reference,
                 clock_offset=question.clock_offset,
                 lever_arm=question.lever_arm,
             )
+            if result.trajectory.is_straight:
+                result.notes.append(
+                    "the path is nearly straight: positions do not tell the turn about it, "
+                    + (
+                        "and without orientations nothing does"
+                        if reference.quats_xyzw is None
+                        else "so it is taken from the orientations"
+                    )
+                )
     with progress.stage("measuring drift"):
         _drift(estimate, odometry, result)
     return estimate

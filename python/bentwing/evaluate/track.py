@@ -11,7 +11,8 @@ import numpy as np
 
 from bentwing.base.clock import NS_PER_S
 from bentwing.base.errors import InputError
-from bentwing.base.tum import read_stamped_rows
+from bentwing.base.tum import read_rows
+from bentwing.evaluate.track_columns import named_columns
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -33,12 +34,14 @@ class Track:
     positions : (N, 3) float64, m, of the tracked point
     quats_xyzw : (N, 4) float64, or None where only positions are known
     origin_ns : absolute stamp of `times == 0` on the reference's clock
+    n_repeats : measurements that had the stamp of the one before, and were left out
     """
 
     times: NDArray[np.float64]
     positions: NDArray[np.float64]
     quats_xyzw: NDArray[np.float64] | None
     origin_ns: int
+    n_repeats: int = 0
 
     def moved_in_time(self, shift: float) -> Track:
         """Return the same with `shift` seconds added to all times."""
@@ -52,14 +55,24 @@ class Track:
 def read_track(path: Path) -> Track:
     """Read a reference trajectory of lines `t x y z` or `t x y z qx qy qz qw`, spaces or commas.
 
+    Columns in another order are read by the names in the first line, as those of EuRoC. Of several
+    measurements with one stamp the first is taken.
+
     Raises
     ------
     InputError
         If the file has another form, or fewer than three measurements.
     """
     path = Path(path)
-    _refuse_other_orders(path)
-    stamps_ns, values = read_stamped_rows(path, (_POSITIONS, _POSES), _LAYOUT)
+    stamps_ns, values = _read(path)
+    repeats = np.append(False, np.diff(stamps_ns) == 0)
+    stamps_ns, values = stamps_ns[~repeats], values[~repeats]
+    if (np.diff(stamps_ns) < 0).any():
+        row = int(np.argmax(np.diff(stamps_ns) < 0))
+        msg = (
+            f"{path}: stamps must increase; one goes back behind {stamps_ns[row] / NS_PER_S:.9f} s"
+        )
+        raise InputError(msg)
     if len(stamps_ns) < _FEWEST:
         msg = f"{path}: holds {len(stamps_ns)} measurements; at least {_FEWEST} are needed"
         raise InputError(msg)
@@ -69,7 +82,18 @@ def read_track(path: Path) -> Track:
         raise InputError(msg)
     times = (stamps_ns - stamps_ns[0]) / NS_PER_S
     quats = _unit(path, values[:, 3:]) if values.shape[1] == _POSES - 1 else None
-    return Track(times, values[:, :3].copy(), quats, int(stamps_ns[0]))
+    return Track(times, values[:, :3].copy(), quats, int(stamps_ns[0]), int(repeats.sum()))
+
+
+def _read(path: Path) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Return stamps (N,), ns, and values (N, 3 or 7) in the usual order."""
+    columns = named_columns(path)
+    if columns is None:
+        return read_rows(path, (_POSITIONS, _POSES), _LAYOUT)
+    stamps_ns, values = read_rows(
+        path, (columns.n,), columns.heading, per_second=columns.per_second
+    )
+    return stamps_ns, values[:, [i - 1 for i in columns.order]]
 
 
 def bridges(stamps: NDArray[np.float64], times: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -94,18 +118,3 @@ def _unit(path: Path, quats: NDArray[np.float64]) -> NDArray[np.float64]:
         raise InputError(msg)
     unit: NDArray[np.float64] = quats / lengths
     return unit
-
-
-def _refuse_other_orders(path: Path) -> None:
-    """Look at the names of the columns, if there are any, before numbers are taken for others."""
-    try:
-        with path.open(encoding="utf-8") as file:
-            head = file.readline(1000).lower()
-    except (OSError, UnicodeDecodeError) as error:
-        msg = f"{path}: not readable as a trajectory ({error})"
-        raise InputError(msg) from error
-    x, w = (min((at for at in (head.find(n), head.find(f"q_{n[1]}")) if at >= 0), default=-1)
-            for n in ("qx", "qw"))  # fmt: skip
-    if 0 <= w < x or "[ns]" in head:
-        msg = f"{path}: its columns are {head.strip()!r}; write `{_LAYOUT.replace('`', '')}`"
-        raise InputError(msg)

@@ -24,6 +24,10 @@ if TYPE_CHECKING:
 
 SAME_CLOCK = 0.01  # s; evo takes stamps of poses that differ by less for the same time
 _ARM_SIGMA = 1.0  # m; how long a lever arm may be, for directions that the motion does not show
+_SHIFT_SIGMA = 10.0  # s; how far a clock may be from where it is looked for, where no speed changes
+_AS_GOOD = 1.5  # times the residual of the best offset; then the clocks are taken to agree
+_STILL = 1e-3  # m
+_SHARED = 0.5  # of the shorter one; with so much common time the clocks may agree
 _ITERATIONS = 60
 _FIRST_LOOK = 12  # iterations that tell the right one of several offsets
 _MOST_USED = (1500, 20_000)  # measurements, evenly chosen: at the first look, and in the end
@@ -91,15 +95,19 @@ def find_tracked_point(
         return TrackedPoint(clock_offset, None, None, lever_arm, None)
     stamped = (track.origin_ns - clock_origin_ns) / NS_PER_S
     arm = np.zeros(3) if lever_arm is None else np.array(lever_arm)
-    starts = coarse_shifts(estimate, track) if clock_offset is None else [stamped - clock_offset]
     free = (clock_offset is None, lever_arm is None)
-    fit = _best_fit(estimate, track, (starts, arm), free)
+    if clock_offset is None:
+        fit = _best_fit(estimate, track, (_starts(estimate, track, stamped), arm), free)
+    else:
+        fit = _best_fit(estimate, track, ([stamped - clock_offset], arm), free)
     found = float(stamped - fit.shift)
-    is_same_clock = track.quats_xyzw is not None and abs(found) < SAME_CLOCK
     applied = found
-    if clock_offset is None and is_same_clock:
-        fit = replace(_best_fit(estimate, track, ([stamped], arm), (False, free[1])), stds=fit.stds)
-        applied = 0.0
+    if clock_offset is None and track.quats_xyzw is not None:
+        same = _fit(estimate, _thinned(track, _MOST_USED[1]), (stamped, arm), (False, free[1]), _ITERATIONS)  # fmt: skip
+        if same is not None and (
+            abs(found) < SAME_CLOCK or same.residual <= _AS_GOOD * fit.residual
+        ):
+            fit, applied = replace(same, stds=fit.stds), 0.0
     x, y, z = fit.arm.tolist()
     sx, sy, sz = fit.stds[1:].tolist()
     return TrackedPoint(
@@ -109,6 +117,26 @@ def find_tracked_point(
         (x, y, z),
         (sx, sy, sz) if lever_arm is None else None,
     )
+
+
+def _starts(estimate: Trajectory, track: Track, stamped: float) -> list[float]:
+    """Return shifts that are worth a look, that of clocks that agree first if it may be.
+
+    Raises
+    ------
+    InputError
+        The speeds tell no shift, and the stamps have nothing in common.
+    """
+    begin = max(estimate.times[0], track.times[0] + stamped)
+    end = min(estimate.times[-1], track.times[-1] + stamped)
+    shorter = min(np.ptp(estimate.times), np.ptp(track.times))
+    stands_still = float(np.ptp(track.positions, axis=0).max()) < _STILL
+    if end - begin < _SHARED * shorter or stands_still:
+        return coarse_shifts(estimate, track)
+    try:
+        return [stamped, *coarse_shifts(estimate, track)]
+    except InputError:
+        return [stamped]
 
 
 def moved_to_point(estimate: Trajectory, arm: tuple[float, float, float]) -> Trajectory:
@@ -137,7 +165,11 @@ def _best_fit(
         )
         raise InputError(msg)
     enough = _COVERED * max(fit.n_covered for fit in found)
-    best = min((fit for fit in found if fit.n_covered >= enough), key=lambda fit: fit.residual)
+    covering = [fit for fit in found if fit.n_covered >= enough]
+    best = min(covering, key=lambda fit: fit.residual)
+    # The first is where the stamps are: a short or even path fits elsewhere as well.
+    if covering[0].residual <= _AS_GOOD * best.residual and covering[0] is looks[0]:
+        best = covering[0]
     return _fit(estimate, many, (best.shift, best.arm), free, _ITERATIONS) or best
 
 
@@ -155,6 +187,7 @@ def _fit(
 ) -> _Fit | None:
     """Fit with Cauchy weights; None if the shift leaves the common time."""
     shift, arm = start
+    begun = shift
     alignment: Alignment | None = None
     sigma = covariance = None
     covered = np.zeros(len(track.times), np.bool_)
@@ -171,7 +204,9 @@ def _fit(
         sizes = np.linalg.norm(residuals, axis=1)
         sigma = max(scale(sizes) / np.sqrt(3), _FINEST_SIGMA)
         design = _design(placed, alignment.R, (velocities, quats), free)
-        step, covariance = _solve(design, residuals, cauchy(sizes, 3 * sigma), (sigma, arm, free))
+        step, covariance = _solve(
+            design, residuals, cauchy(sizes, 3 * sigma), (sigma, shift - begun, arm, free)
+        )
         turn = geometry.to_matrices(geometry.exp(step[:3]))
         alignment = Alignment(turn @ alignment.R, turn @ alignment.t + step[3:6])
         shift, arm = shift + float(step[6]), arm + step[7:]
@@ -219,16 +254,19 @@ def _solve(
     design: NDArray[np.float64],
     residuals: NDArray[np.float64],
     weights: NDArray[np.float64],
-    prior: tuple[float, NDArray[np.float64], tuple[bool, bool]],
+    prior: tuple[float, float, NDArray[np.float64], tuple[bool, bool]],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Step (10,) and covariance (10, 10); what is not free stays."""
-    sigma, arm, free = prior
+    sigma, moved, arm, free = prior
     centre = np.zeros(10)
     rows, weighted = design.reshape(-1, 10), (design * weights[:, None, None]).reshape(-1, 10)
     information, gradient = weighted.T @ rows, weighted.T @ residuals.ravel()
     strength = (sigma / _ARM_SIGMA) ** 2
     information[range(7, 10), range(7, 10)] += strength
     centre[7:] = strength * arm * free[1]
+    held = (sigma / _SHIFT_SIGMA) ** 2
+    information[6, 6] += held
+    centre[6] = held * moved * free[0]
     kept = np.array([True] * 6 + [free[0]] + [free[1]] * 3)
     step, covariance = np.zeros(10), np.zeros((10, 10))
     inverse = np.linalg.pinv(information[np.ix_(kept, kept)], rcond=1e-14, hermitian=True)

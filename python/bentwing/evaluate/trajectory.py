@@ -9,7 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bentwing.base import geometry
-from bentwing.evaluate.alignment import Alignment, align, associate, without_frame_rotation
+from bentwing.evaluate.alignment import (
+    Alignment,
+    align,
+    align_poses,
+    associate,
+    without_frame_rotation,
+)
 from bentwing.evaluate.statistics import Statistics
 
 if TYPE_CHECKING:
@@ -96,7 +102,11 @@ def absolute_error(
     yaw_only : align by a turn about z and a shift only, so that an error of levelling counts
     """
     matched, truth = associate(estimate, truth, during)
-    alignment = align(matched.positions, truth.positions, yaw_only=yaw_only)
+    alignment = (
+        align(matched.positions, truth.positions, yaw_only=True)
+        if yaw_only
+        else align_poses(matched, truth)
+    )
     aligned = alignment.apply(matched)
     errors = aligned.positions - truth.positions
     distances = np.linalg.norm(errors, axis=1)
@@ -178,7 +188,7 @@ def _comparable(
 ) -> tuple[Trajectory, Trajectory]:
     """Both at the same times and in one frame, without the constant rotation of the IMU frame."""
     matched, truth = associate(estimate, truth, during)
-    aligned = align(matched.positions, truth.positions).apply(matched)
+    aligned = align_poses(matched, truth).apply(matched)
     return without_frame_rotation(aligned, truth), truth
 
 

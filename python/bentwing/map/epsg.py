@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import laspy
 
+from bentwing.map.las_bounds import require_sound_las
+
 if TYPE_CHECKING:
     from pathlib import Path
 
@@ -21,6 +23,7 @@ def epsg_of_map(path: Path) -> int | None:
     """Return the EPSG code of a LAS or LAZ file; None where it states none, and for other formats."""
     if path.suffix.lower() not in {".laz", ".las"}:
         return None
+    require_sound_las(path)
     with laspy.open(path) as reader:
         records = [*reader.header.vlrs, *(reader.header.evlrs or [])]
     for record in records:

@@ -76,7 +76,9 @@ def read_parts(
         raise
     except Exception as error:
         # Parsers of foreign files fail in every way there is; the file is what the user can change.
-        msg = f"{path}: not readable as {suffix[1:].upper()} ({error})"
+        # Some libraries go on for lines about where in their sources they were.
+        what = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
+        msg = f"{path}: not readable as {suffix[1:].upper()} ({what})"
         raise InputError(msg) from error
 
 

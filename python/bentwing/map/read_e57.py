@@ -23,6 +23,8 @@ def e57_scans(path: Path) -> Iterator[tuple[NDArray[np.float64], None]]:
     file = require_package("e57").E57(str(path))
     try:
         for scan in range(file.scan_count):
+            if not file.get_header(scan).point_count:
+                continue
             # with its pose applied, and without the returns that the scanner calls invalid
             columns = file.read_scan(scan, ignore_missing_fields=True)
             yield np.stack([columns[axis] for axis in _AXES], axis=1).astype(np.float64), None

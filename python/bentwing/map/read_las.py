@@ -9,6 +9,7 @@ import laspy
 import numpy as np
 
 from bentwing.base.errors import InputError
+from bentwing.map.las_bounds import require_sound_las
 from bentwing.map.read_rows import PART
 
 if TYPE_CHECKING:
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
 def las_points(path: Path) -> Iterator[Table]:
     """Read coordinates and times part by part."""
+    require_sound_las(path)
     with laspy.open(path) as file:
         has_times = "gps_time" in file.header.point_format.dimension_names
         n = 0

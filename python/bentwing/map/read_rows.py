@@ -28,6 +28,8 @@ PLY_TYPES = {
 PCD_OFFSET = "# add to x y z:"
 _TIME = "time"  # the column our own files have
 _MAX_HEADER_LINES = 1000
+_MOST_COLUMNS = 10_000
+_MOST_EXPANDED = 100  # bytes that LZF makes of one
 
 
 def ply_rows(path: Path) -> Iterator[Table]:
@@ -71,6 +73,9 @@ def pcd_rows(path: Path) -> Iterator[Table]:
         header = {words[0]: words[1:] for words in header_lines(path, file, "DATA")}
         kinds = zip(header["TYPE"], header["SIZE"], strict=True)
         counts = header.get("COUNT", ["1"] * len(header["FIELDS"]))
+        if (n_columns := sum(map(int, counts))) > _MOST_COLUMNS:
+            msg = f"{path}: announces {n_columns} columns; it is damaged"
+            raise InputError(msg)
         columns = list(zip(header["FIELDS"], kinds, counts, strict=True))
         count = int(header["POINTS"][0])
         if header["DATA"][0] == "ascii":
@@ -112,7 +117,10 @@ def _compressed_columns(path: Path, file: BinaryIO, dtype: np.dtype[Any], count:
     if size != count * dtype.itemsize:
         msg = f"{path}: announces {count} points of {dtype.itemsize} bytes, holds {size} bytes"
         raise InputError(msg)
-    data = decompress_lzf(file.read(compressed), size)
+    packed = file.read(compressed)
+    if len(packed) < compressed or size > _MOST_EXPANDED * compressed:
+        _refuse_truncated(path, count, 0)
+    data = decompress_lzf(packed, size)
     columns: dict[str, NDArray[np.float64]] = {}
     at = 0
     for name in dtype.names or ():

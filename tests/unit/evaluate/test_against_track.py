@@ -113,6 +113,52 @@ def test_a_pose_reference_on_another_clock_is_found(flight, estimate):
     assert found.absolute.maximum < 1e-3
 
 
+def straight(n=100, *, noise=0.0, turn=(0.0, 0.0, 0.0)):
+    """A drive along a line at constant speed, level."""
+    times = np.arange(n) / 10
+    positions = np.outer(2.0 * times, [1.0, 0.0, 0.0])
+    positions = positions + np.random.default_rng(1).normal(0, noise, (n, 3))
+    quats = np.tile([0.0, 0.0, 0.0, 1.0], (n, 1))
+    turned = geometry.to_matrices(geometry.exp(np.array(turn)))
+    return Trajectory(
+        times, positions @ turned.T, geometry.multiply(geometry.exp(np.array(turn)), quats)
+    )
+
+
+@pytest.mark.parametrize("turn", [(0.0, 0.0, 0.0), (1.6, 0.0, 0.0), (0.3, -0.5, 2.0)])
+def test_a_straight_path_takes_the_turn_about_it_from_the_orientations(turn):
+    found = compare_with_track(straight(noise=0.003), ORIGIN, as_track(straight(turn=turn)))
+    assert found.is_straight
+    assert found.tracked_point.clock_offset == 0.0
+    assert found.rotation.as_is.maximum < np.radians(0.05)
+    assert found.absolute.maximum < 0.02
+    assert found.error_over_speed is None
+
+
+def test_heading_does_not_drift_on_a_straight_path_that_is_off_by_noise():
+    (five, *_) = drift_boxes(straight(noise=0.02), straight())
+    assert abs(five.heading.median) < 1e-9
+
+
+def test_without_orientations_nothing_tells_the_turn_about_a_straight_path():
+    reference = straight()
+    track = Track(reference.times, reference.positions, None, ORIGIN)
+    assert compare_with_track(straight(noise=0.01), ORIGIN, track).is_straight
+
+
+def test_a_path_that_bends_is_aligned_by_its_positions(noisy, estimate):
+    assert not compare_with_track(noisy, ORIGIN, as_track(every(5, estimate))).is_straight
+
+
+def test_a_short_path_whose_stamps_agree_is_not_moved_far_in_time(flight, estimate):
+    # Another second of the flight happens to look alike, but the stamps say which one it is.
+    poses = flight(np.arange(20.0, 21.4, 0.01))
+    noise = np.random.default_rng(4).normal(0, 0.004, poses.positions.shape)
+    short = Trajectory(poses.times, poses.positions + noise, poses.quats_xyzw)
+    point = compare_with_track(short, ORIGIN, as_track(estimate)).tracked_point
+    assert point.clock_offset == 0.0
+
+
 def test_recordings_of_different_flights_are_refused(estimate):
     short = Track(
         *(v[:5] for v in (np.arange(5.0), np.random.default_rng(0).normal(size=(5, 3)))),

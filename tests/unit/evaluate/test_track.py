@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
 import contextlib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -45,11 +46,12 @@ def test_poses_are_read_and_their_quaternions_made_unit(track):
         ("", "holds no pose"),
         ("0 1 2 3\n", "holds 1 measurements"),
         ("0 1 2\n" * 3, "expected `t x y z"),
-        ("1 0 0 0 0 1 0 0 0 0 1 0\n" * 3, "expected `t x y z"),  # KITTI
+        ("1 0 0 0 0 1 0 0 0 0 1 0\n" * 3, "as KITTI writes them, without times"),
         ("0 1 2 3\n1 1 2 3 0 0 0 1\n2 1 2 3\n", "line 2"),
         ("1403636579763555584 1 2 3\n", "t in seconds"),
-        ("#timestamp [ns], p_x [m], p_y [m], p_z [m]\n0 1 2 3\n", "its columns are"),
-        ("t,x,y,z,qw,qx,qy,qz\n0,1,2,3,1,0,0,0\n", "its columns are"),
+        ("t,north,east,height\n0,1,2,3\n", "its columns are"),
+        ("1e999980 1 2 3\n" * 3, "line 1"),
+        ("1e-999980 1 2 3\n" * 3, "line 1"),
         ("0 1 2 3\n2 1 2 3\n1 1 2 3\n", "stamps must increase"),
         ("0 1 2 3\n1 nan 2 3\n2 1 2 3\n", "measurement 2 is not finite"),
         ("0 1 2 3 0 0 0 1\n1 1 2 3 0 0 0 0\n2 1 2 3 0 0 0 1\n", "length 0"),
@@ -61,6 +63,34 @@ def test_poses_are_read_and_their_quaternions_made_unit(track):
 def test_other_formats_are_refused_with_what_was_found(track, content, says):
     with pytest.raises(InputError, match=says):
         track(content)
+
+
+EUROC = """#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], q_RS_z [], v_RS_R_x [m s^-1]
+1403715524907143168,1,2,3,0.5,0.1,-0.7,-0.5,9
+1403715524912143104,2,3,4,1,0,0,0,9
+1403715524917143040,4,5,6,1,0,0,0,9
+"""
+
+
+def test_columns_in_another_order_are_read_by_their_names(track):
+    found = track(EUROC)
+    assert found.origin_ns == 1403715524907143168
+    assert found.times[1] == pytest.approx(0.004999936, abs=1e-12)
+    assert found.positions.tolist() == [[1, 2, 3], [2, 3, 4], [4, 5, 6]]
+    np.testing.assert_allclose(found.quats_xyzw[0], [0.1, -0.7, -0.5, 0.5], atol=1e-12)
+    named = track("t,x,y,z,qw,qx,qy,qz\n0,1,2,3,1,0,0,0\n1,2,3,4,0,1,0,0\n2,4,5,6,1,0,0,0\n")
+    assert named.quats_xyzw.tolist() == [[0, 0, 0, 1], [1, 0, 0, 0], [0, 0, 0, 1]]
+
+
+def test_of_measurements_with_one_stamp_the_first_is_taken_and_the_rest_counted(track):
+    found = track("0 1 2 3\n0 9 9 9\n0 9 9 9\n1 2 3 4\n2 4 5 6\n")
+    assert found.positions.tolist() == [[1, 2, 3], [2, 3, 4], [4, 5, 6]]
+    assert found.n_repeats == 2
+
+
+def test_a_device_is_no_trajectory():
+    with pytest.raises(InputError):
+        read_track(Path("/dev/zero"))
 
 
 def test_a_missing_file_is_an_input_error(tmp_path):

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
 """Reading maps part by part, their times, scans of stations, and meshes."""
 
+import struct
+
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -155,3 +157,78 @@ def test_compressed_pcd_files_are_read_and_truncated_ones_refused(tmp_path):
     path.write_bytes(content[:-5])
     with pytest.raises(InputError):
         read_points(path)
+
+
+HUGE = 2**32 - 1
+
+
+@pytest.mark.parametrize(
+    ("kind", "at", "form", "value"),
+    [
+        ("las", 100, "<I", HUGE),  # records
+        ("laz", 100, "<I", HUGE),
+        ("las", 243, "<I", HUGE),  # extended records
+        ("las", 96, "<I", HUGE),  # where the points begin
+        ("las", 247, "<Q", 2**40),  # points
+        ("las", 94, "<H", 10),  # size of the header
+    ],
+)
+def test_a_las_file_that_announces_more_than_it_holds_is_refused_at_once(
+    tmp_path, kind, at, form, value
+):
+    path = tmp_path / f"map.{kind}"
+    written(path)
+    content = bytearray(path.read_bytes())
+    struct.pack_into(form, content, at, value)
+    if at == 243:
+        struct.pack_into("<Q", content, 235, 375)
+    path.write_bytes(content)
+    with pytest.raises(InputError, match="cannot hold"):
+        read_points(path)
+
+
+@pytest.mark.parametrize("missing", [0, 1, 700, 2_000])
+def test_a_laz_file_that_lacks_a_byte_is_an_input_error(tmp_path, missing):
+    path = tmp_path / "map.laz"
+    written(path)
+    content = bytearray(path.read_bytes())
+    (start,) = struct.unpack_from("<I", content, 96)
+    del content[start + 8 + missing]
+    path.write_bytes(content)
+    with pytest.raises(InputError):
+        read_points(path)
+
+
+def test_a_laz_file_with_a_huge_table_of_chunks_is_refused_at_once(tmp_path):
+    path = tmp_path / "map.laz"
+    written(path)
+    content = bytearray(path.read_bytes())
+    (start,) = struct.unpack_from("<I", content, 96)
+    (table,) = struct.unpack_from("<q", content, start)
+    struct.pack_into("<I", content, table + 4, HUGE)
+    path.write_bytes(content)
+    with pytest.raises(InputError, match="a table of chunks that the file cannot hold"):
+        read_points(path)
+
+
+def test_a_pcd_file_with_a_huge_number_of_columns_is_refused_at_once(tmp_path):
+    path = tmp_path / "map.pcd"
+    path.write_text(
+        "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 2000000000\nPOINTS 1\nDATA ascii\n0 0 0\n"
+    )
+    with pytest.raises(InputError, match="announces 2000000002 columns"):
+        read_points(path)
+
+
+def test_an_error_of_a_library_is_one_line(tmp_path, monkeypatch):
+    def broken(_path):
+        msg = "bad packet\n context: 0\n source: packet.cpp"
+        raise ValueError(msg)
+        yield
+
+    monkeypatch.setattr("bentwing.map.read_las.las_points", broken)
+    path = tmp_path / "map.las"
+    path.touch()
+    with pytest.raises(InputError) as refused:
+        read_points(path)
+    assert str(refused.value) == f"{path}: not readable as LAS (bad packet)"

@@ -102,16 +102,24 @@ def test_an_answer_to_such_a_question_is_believed(faulted):
     assert (found.doubt, found.findings) == (None, ())
 
 
-@pytest.mark.parametrize("fault", ["gyro-zero", "accel-no-gravity", "gyro-1.2"])
-def test_what_cannot_be_put_right_is_named(faulted, fault):
-    recording, payload = faulted("vlp16-fixed", fault)
-    doubt = find_set_up([recording], Payload.load(payload)).doubt
-    words = {
-        "gyro-zero": "gyro shows the same",
-        "accel-no-gravity": "gravity",
-        "gyro-1.2": "times the turn that the lidar sees",
-    }
-    assert words[fault] in doubt
+@pytest.mark.parametrize(
+    ("head", "fault", "words"),
+    [
+        ("vlp16-fixed", "gyro-zero", "gyro shows the same"),
+        ("vlp16-fixed", "accel-no-gravity", "gravity"),
+        ("vlp16-fixed", "gyro-1.2", "1.20 times the turn that the lidar sees"),
+        ("hokuyo-spin", "ranges-1.3", "ranges are about 1.3"),
+        *(
+            pytest.param(head, "gyro-1.2", "about 1.2", marks=pytest.mark.slow)
+            for head in ("hokuyo-spin", "hokuyo-nod")
+        ),
+    ],
+)
+def test_what_cannot_be_put_right_is_named(faulted, head, fault, words):
+    recording, payload = faulted(head, fault)
+    found = find_set_up([recording], Payload.load(payload))
+    assert found.is_defect
+    assert words in found.doubt
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from bentwing import odometry
 from bentwing.base.errors import EstimationError, RecordingError
+from bentwing.evaluate.verdict import Evidence
 from bentwing.run.first_pass import FirstPass, blames_head
 
 if TYPE_CHECKING:
@@ -42,7 +43,7 @@ def estimate(job: Job, found: Found, head: Head) -> tuple[Job, Found]:
     if shown.doubt is not None:
         if first.doubt is not None:
             raise RecordingError(_refusal(first.doubt, shown))
-        return job, first
+        return job, _with_defect(first, shown)
     if shown.findings:
         head.use(shown)
         job = replace(job, part=head.part, settings=head.settings)
@@ -65,6 +66,14 @@ def _is_doubted(first: Found) -> bool:
     if first.failure is not None:
         return isinstance(first.failure, EstimationError)
     return blames_head(first.doubt or first.verdict)
+
+
+def _with_defect(first: Found, shown: SetUp) -> Found:
+    """Return what was found with what the search for the set-up says is wrong, if it names it."""
+    if shown.doubt is None or not shown.is_defect:
+        return first
+    evidence = Evidence("set_up", 1.0, (), {"problem": shown.doubt})
+    return replace(first, evidence=(*first.evidence, evidence))
 
 
 def _refusal(verdict: Verdict, shown: SetUp) -> str:

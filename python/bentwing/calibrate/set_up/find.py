@@ -9,13 +9,14 @@ import numpy as np
 
 from bentwing.calibrate.set_up import edits
 from bentwing.calibrate.set_up.compare import findings_between
+from bentwing.calibrate.set_up.errors import DefectError, NotFoundError
 from bentwing.calibrate.set_up.motor import UNITS, describe_motor, zero_between
 from bentwing.calibrate.set_up.noise import ImuNoise, states_noise
 from bentwing.calibrate.set_up.planar import describe_by_trials
 from bentwing.calibrate.set_up.refine import refined
 from bentwing.calibrate.set_up.set_up import SetUp
 from bentwing.calibrate.set_up.signals import Averages
-from bentwing.calibrate.set_up.spatial import NotFoundError, describe_by_motion, followed
+from bentwing.calibrate.set_up.spatial import describe_by_motion, followed
 from bentwing.calibrate.set_up.stretch import read_stretch
 from bentwing.calibrate.set_up.units import with_imu_units, with_range_unit
 from bentwing.odometry.planar import is_plane
@@ -58,7 +59,7 @@ def find_set_up(
     try:
         found = _Search(paths, payload, after, threads).found()
     except NotFoundError as error:
-        return SetUp(payload, doubt=str(error))
+        return SetUp(payload, doubt=str(error), is_defect=isinstance(error, DefectError))
     findings = findings_between(payload, found)
     return SetUp(found if findings else payload, findings)
 

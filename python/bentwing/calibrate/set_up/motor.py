@@ -14,8 +14,8 @@ import numpy as np
 
 from bentwing.base import geometry
 from bentwing.calibrate.set_up import edits
+from bentwing.calibrate.set_up.errors import NotFoundError
 from bentwing.calibrate.set_up.motion import HALF
-from bentwing.calibrate.set_up.spatial import NotFoundError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -14,10 +14,10 @@ import numpy as np
 
 from bentwing.calibrate.set_up import axes, edits
 from bentwing.calibrate.set_up.crossings import Crossings, Reading
+from bentwing.calibrate.set_up.errors import NotFoundError
 from bentwing.calibrate.set_up.noise import ImuNoise
 from bentwing.calibrate.set_up.returns import NEARBY, delays_by_returns
 from bentwing.calibrate.set_up.scans import Scans
-from bentwing.calibrate.set_up.spatial import NotFoundError
 from bentwing.calibrate.set_up.trials import Trials
 from bentwing.recording import imu_units
 
@@ -71,6 +71,8 @@ def describe_by_trials(
     trials = Trials(stretch, ImuNoise.of(imu), has_mount=given is not None, threads=threads)
     if given is not None and (found := trials.as_described(given)):
         return found
+    if given is not None:
+        trials.require_scale_of_ranges(given)
     scans = Scans(stretch.lidar)
     crossings = Crossings(scans, imu)
     delays = _delays(scans, imu, crossings)
@@ -90,6 +92,8 @@ def describe_by_trials(
     others = itertools.chain(descriptions.of_mounts(), delayed[LIKELY:])
     if found := _first(trials.at_a_glance(other) for other in others):
         return found
+    if given is not None:
+        trials.require_scale_of_gyro(given)
     raise NotFoundError(trials.failure)
 
 

@@ -3,12 +3,14 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import TYPE_CHECKING
 
 from bentwing.base.mount import FixedMount
 from bentwing.calibrate.set_up import edits
+from bentwing.calibrate.set_up.errors import NotFoundError
 from bentwing.calibrate.set_up.noise import ImuNoise
-from bentwing.calibrate.set_up.spatial import NotFoundError
+from bentwing.calibrate.set_up.scales import require_scale_of_ranges
 from bentwing.calibrate.set_up.trial import try_payload
 from bentwing.calibrate.set_up.trials import richest
 from bentwing.recording.sections.section import Transform
@@ -17,6 +19,7 @@ if TYPE_CHECKING:
     from bentwing.base.calibration import Calibration
     from bentwing.base.mount import Pose
     from bentwing.calibrate.set_up.stretch import Stretch
+    from bentwing.calibrate.set_up.trial import Trial
     from bentwing.recording import Payload
 
 # Standard deviations of what was found before: s, rad; and of a shift that nothing has told yet, m.
@@ -38,7 +41,15 @@ def refined(stretch: Stretch, payload: Payload, *, has_mount: bool, threads: int
         wide = edits.with_std(wide, extrinsic_translation=UNKNOWN_SHIFT)
     read = stretch.read_as(wide)
     wide = ImuNoise.of(read.imu).at_least_in(wide)
-    trial = try_payload(read.part(*richest(read.imu, REFINED)), wide, threads)
+    span = richest(read.imu, REFINED)
+
+    @cache
+    def tried(scale: float) -> Trial:
+        scaled = edits.with_lidar(wide, range_scale=wide.lidar.range_scale / scale)
+        return try_payload(stretch.read_as(scaled).part(*span), scaled, threads)
+
+    trial = tried(1.0)
+    require_scale_of_ranges(tried)
     if not trial.is_consistent or trial.calibration is None:
         raise NotFoundError(trial.sentence)
     mount = trial.calibration.mount

@@ -44,11 +44,13 @@ class SetUp:
     payload : the description with what was found
     findings : in what it differs from the one given; none where that one holds
     doubt : why it is not certain, with what to do; None where it is
+    is_defect : whether the doubt names what is wrong with a sensor
     """
 
     payload: Payload
     findings: tuple[Finding, ...] = ()
     doubt: str | None = None
+    is_defect: bool = False
 
     def to_json(self) -> dict[str, Any]:
         """Return the set-up in plain JSON types."""

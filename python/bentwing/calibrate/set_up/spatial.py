@@ -9,6 +9,7 @@ import numpy as np
 
 from bentwing.base.errors import EstimationError
 from bentwing.calibrate.set_up import axes, edits
+from bentwing.calibrate.set_up.errors import DefectError, NotFoundError
 from bentwing.calibrate.set_up.explain import explain
 from bentwing.calibrate.set_up.hand_eye import fit_accel, fit_gyro
 from bentwing.calibrate.set_up.motion import lidar_motion
@@ -33,10 +34,6 @@ HAND_IS_CLEAR = 0.7
 AXES_ARE_CLEAR = 0.7
 # rad; a described rotation that is farther off is replaced, a better one the estimator corrects.
 AS_DESCRIBED = np.radians(5.0)
-
-
-class NotFoundError(EstimationError):
-    """The set-up does not show; the sentence says why and what to do."""
 
 
 def describe_by_motion(
@@ -127,7 +124,7 @@ def _scaled(payload: Payload, gyro: GyroFit, imu_topic: str) -> Payload:
             f"{imu_topic}: the gyro shows {gyro.scale:.2f} times the turn that the lidar sees; "
             "correct its scale in the driver"
         )
-        raise NotFoundError(msg)
+        raise DefectError(msg)
     if unit == imu.units.gyro:
         return payload
     return edits.with_imu(payload, units=imu.units.model_copy(update={"gyro": unit}))

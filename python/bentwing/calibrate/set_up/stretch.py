@@ -91,6 +91,14 @@ class Stretch:
         """The same without inertial samples."""
         return replace(self, batches=tuple(b for b in self.batches if not isinstance(b, ImuBatch)))
 
+    def with_gyro_scaled(self, factor: float) -> Stretch:
+        """Return the same with the rates of the gyro multiplied by a factor."""
+        batches = tuple(
+            replace(batch, gyro=factor * batch.gyro) if isinstance(batch, ImuBatch) else batch
+            for batch in self.batches
+        )
+        return replace(self, batches=batches)
+
     def read_as(self, payload: Payload) -> Stretch:
         """Return the samples as a payload reads those that drivers give, the encoder's apart."""
         lidar, imu = LidarReading.of(payload.lidar), ImuReading.of(payload.imu)

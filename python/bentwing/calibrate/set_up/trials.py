@@ -3,12 +3,14 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bentwing.base.mount import FixedMount
 from bentwing.calibrate.set_up import edits
+from bentwing.calibrate.set_up.scales import require_scale_of_gyro, require_scale_of_ranges
 from bentwing.calibrate.set_up.trial import try_payload
 
 if TYPE_CHECKING:
@@ -57,6 +59,37 @@ class Trials:
         if again.is_promising and not again.is_consistent:
             again = self._tried(self._learned(payload, again), CLOSE, TRIED)
         return self._learned(payload, again) if again.is_consistent else None
+
+    def require_scale_of_gyro(self, payload: Payload) -> None:
+        """Refuse a gyro with a wrong scale, where only that contradicts a description.
+
+        Raises
+        ------
+        DefectError
+        """
+        require_scale_of_gyro(
+            lambda scale: self._with_gyro(scale)._tried(payload, CLOSE, GLANCE),
+            lambda scale: self._with_gyro(scale)._tried(payload, CLOSE, TRIED),
+        )
+
+    def require_scale_of_ranges(self, payload: Payload) -> None:
+        """Refuse ranges with a wrong scale.
+
+        Raises
+        ------
+        DefectError
+        """
+
+        @cache
+        def tried(scale: float) -> Trial:
+            scaled = edits.with_lidar(payload, range_scale=payload.lidar.range_scale / scale)
+            return self._tried(scaled, AS_DESCRIBED, TRIED)
+
+        require_scale_of_ranges(tried)
+
+    def _with_gyro(self, scale: float) -> Trials:
+        stretch = self._stretch.with_gyro_scaled(1.0 / scale)
+        return Trials(stretch, self._noise, has_mount=self._has_mount, threads=self._threads)
 
     @property
     def failure(self) -> str:

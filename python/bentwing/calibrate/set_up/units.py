@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bentwing.calibrate.set_up import edits
-from bentwing.calibrate.set_up.spatial import NotFoundError
+from bentwing.calibrate.set_up.errors import DefectError
 from bentwing.recording import imu_units
 from bentwing.recording.sections.imu import ImuUnits
 
@@ -35,7 +35,7 @@ def with_imu_units(payload: Payload, imu: ImuBatch, topic: str) -> Payload:
 
     Raises
     ------
-    NotFoundError
+    DefectError
         The samples are no reading of an IMU that moves under gravity.
     """
     if len(imu.times) < imu_units.MIN_SAMPLES:
@@ -43,11 +43,11 @@ def with_imu_units(payload: Payload, imu: ImuBatch, topic: str) -> Payload:
     for name, samples in (("gyro", imu.gyro), ("accelerometer", imu.accel)):
         if (np.ptp(samples, axis=0) == 0.0).all():
             msg = f"{topic}: the {name} shows the same in all samples; check it and its driver"
-            raise NotFoundError(msg)
+            raise DefectError(msg)
     accel = imu_units.accel_unit(imu.accel)
     if accel is None or imu_units.lacks_gravity(imu.times, imu.accel):
         msg = f"{topic}: {'; '.join(imu_units.problems(imu.times, imu.gyro, imu.accel))}"
-        raise NotFoundError(msg)
+        raise DefectError(msg)
     is_degrees = imu_units.gyro_scale(imu.times, imu.gyro, imu.accel) != 1.0
     units = ImuUnits(accel=accel, gyro="deg/s" if is_degrees else "rad/s")
     return payload if units == ImuUnits() else edits.with_imu(payload, units=units)

@@ -52,6 +52,11 @@ KINDS: dict[str, Kind] = {
         "{problem}",
         "then map again",
     ),
+    "set_up": Kind(
+        0, 0.5, _NEVER,
+        "{problem}",
+        "then map again",
+    ),
     "constant": Kind(
         0, 0.5, 0.5,
         "the {instrument} gives the same value all the time",

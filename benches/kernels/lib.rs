@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 use bentwing_registration::{Globals, Settings as Registration};
 use bentwing_surfels::{Points, SurfelSet};
-use bentwing_trajectory::{Head, Imu, Trajectory, so3};
+use bentwing_trajectory::{Head, Imu, InertialUnit, Trajectory, so3};
 pub use chain::chain;
 pub use features::Features;
 pub use window::prior;
@@ -75,8 +75,7 @@ impl Scanner {
                     latency: 0.0,
                     motor: None,
                 },
-                gyro_bias: Vector3::zeros(),
-                accel_bias: Vector3::zeros(),
+                unit: InertialUnit::ideal(),
                 gravity: Vector3::z() * GRAVITY,
             },
             scanner: self,

@@ -2,17 +2,19 @@
 //! The registration of a flight as one window.
 
 use bentwing_registration::{
-    GlobalMatrix, GlobalPrior, Initial, N_GLOBALS, NormalEquations, Problem, first_equations,
+    GlobalMatrix, GlobalPrior, Initial, N_GLOBALS, NormalEquations, Problem, first_equations, index,
 };
 
 use crate::Flight;
 
-/// A head without motor: the last five states do not exist.
+/// A head without motor, whose states do not exist, and an IMU whose answer is known.
 pub fn prior() -> GlobalPrior {
     GlobalPrior {
         information: GlobalMatrix::from_diagonal_element(1e5),
         offset: [0.0; N_GLOBALS],
-        frozen: std::array::from_fn(|g| g >= N_GLOBALS - 5),
+        frozen: std::array::from_fn(|g| {
+            (index::ENCODER_ZERO..index::HEAD.end).contains(&g) || g >= index::GYRO_SCALE.start
+        }),
     }
 }
 

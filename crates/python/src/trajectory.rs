@@ -3,9 +3,10 @@
 
 use bentwing_registration::{Globals as RustGlobals, N_GLOBALS, PoseResponse, UNMOVED, follow};
 use bentwing_trajectory::{
-    Head, Imu as RustImu, Motor, Trajectory, extend_constant_velocity, extend_inertial,
+    Head, Imu as RustImu, InertialUnit, Motor, Trajectory, extend_constant_velocity,
+    extend_inertial,
 };
-use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
 use numpy::{
     PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2,
     PyReadonlyArray3, PyUntypedArrayMethods, ToPyArray,
@@ -178,27 +179,20 @@ impl Samples {
             }
             Some(imu) => {
                 let g = &globals.0;
-                extend_inertial(
-                    &mut trajectory,
-                    &imu.0,
-                    &g.gyro_bias,
-                    &g.accel_bias,
-                    &g.gravity,
-                    until,
-                )
+                extend_inertial(&mut trajectory, &imu.0, &g.unit, &g.gravity, until)
             }
         };
         Ok((Self(trajectory, self.1.clone()), n_blind))
     }
 
-    /// These samples where a correction (20,) of the slow states moves them.
+    /// These samples where a correction (44,) of the slow states moves them.
     fn following(&self, correction: [f64; N_GLOBALS]) -> Self {
         let mut trajectory = self.0.clone();
         follow(&mut trajectory, &self.1, &correction);
         Self(trajectory, self.1.clone())
     }
 
-    /// How samples follow the slow states (K, 6, 20): derivatives of their rotations, rad, and their
+    /// How samples follow the slow states (K, 6, 44): derivatives of their rotations, rad, and their
     /// translations, m, in the map.
     fn responses_at<'py>(
         &self,
@@ -232,7 +226,7 @@ impl Samples {
     }
 }
 
-/// An array (K, 6, 20) of responses.
+/// An array (K, 6, 44) of responses.
 fn response_array<'py>(
     py: Python<'py>,
     responses: &[PoseResponse],
@@ -241,7 +235,7 @@ fn response_array<'py>(
     flat.to_pyarray(py).reshape([responses.len(), 6, N_GLOBALS])
 }
 
-/// The responses in an array (K, 6, 20).
+/// The responses in an array (K, 6, 44).
 fn pose_responses(array: &PyReadonlyArray3<'_, f64>) -> PyResult<Vec<PoseResponse>> {
     let shape = array.shape();
     let flat = array.as_slice().ok().filter(|_| array.is_c_contiguous());
@@ -300,12 +294,51 @@ impl Transform {
     }
 }
 
+/// Scales and misalignments of an inertial unit: `gyro`, `g_sensitivity` and `accel` (3, 3) by rows,
+/// `reference` (3), `main_axis`.
+#[derive(FromPyObject, IntoPyObject)]
+struct Unit([[f64; 3]; 3], [[f64; 3]; 3], [[f64; 3]; 3], [f64; 3], usize);
+
+impl Unit {
+    fn of(unit: &InertialUnit) -> Self {
+        let rows = |m: &Matrix3<f64>| std::array::from_fn(|r| std::array::from_fn(|c| m[(r, c)]));
+        Self(
+            rows(&unit.gyro),
+            rows(&unit.g_sensitivity),
+            rows(&unit.accel),
+            unit.reference.into(),
+            unit.main_axis,
+        )
+    }
+
+    /// The unit with these, without biases.
+    fn checked(&self) -> PyResult<InertialUnit> {
+        let matrix = |rows: &[[f64; 3]; 3]| -> PyResult<Matrix3<f64>> {
+            let [x, y, z] = rows;
+            let row = |v: &[f64; 3]| finite_vector("unit", *v).map(|v| v.transpose());
+            Ok(Matrix3::from_rows(&[row(x)?, row(y)?, row(z)?]))
+        };
+        if self.4 > 2 {
+            let message = format!("unit: expected a main axis of 0, 1 or 2, got {}", self.4);
+            return Err(PyValueError::new_err(message));
+        }
+        Ok(InertialUnit {
+            gyro: matrix(&self.0)?,
+            g_sensitivity: matrix(&self.1)?,
+            accel: matrix(&self.2)?,
+            reference: finite_vector("unit", self.3)?,
+            main_axis: self.4,
+            ..InertialUnit::ideal()
+        })
+    }
+}
+
 #[pymethods]
 impl Globals {
     /// Transforms are pairs of translation (3) and quaternion x, y, z, w.
     #[new]
     #[pyo3(signature = (
-        T_imu_base, *, latency, gyro_bias, accel_bias, gravity,
+        T_imu_base, *, latency, gyro_bias, accel_bias, gravity, unit = None,
         motor_axis = None, encoder_zero = 0.0, T_motor_lidar = None,
     ))]
     #[allow(clippy::too_many_arguments, reason = "the states by name")]
@@ -315,6 +348,7 @@ impl Globals {
         gyro_bias: [f64; 3],
         accel_bias: [f64; 3],
         gravity: [f64; 3],
+        unit: Option<Unit>,
         motor_axis: Option<[f64; 3]>,
         encoder_zero: f64,
         T_motor_lidar: Option<Transform>,
@@ -340,10 +374,14 @@ impl Globals {
             latency: finite_number("latency", latency)?,
             motor,
         };
+        let unit = unit.map_or_else(|| Ok(InertialUnit::ideal()), |unit| unit.checked())?;
         Ok(Self(RustGlobals {
             head,
-            gyro_bias: finite_vector("gyro_bias", gyro_bias)?,
-            accel_bias: finite_vector("accel_bias", accel_bias)?,
+            unit: InertialUnit {
+                gyro_bias: finite_vector("gyro_bias", gyro_bias)?,
+                accel_bias: finite_vector("accel_bias", accel_bias)?,
+                ..unit
+            },
             gravity: finite_vector("gravity", gravity)?,
         }))
     }
@@ -358,6 +396,7 @@ impl Globals {
         named.set_item("gyro_bias", self.gyro_bias(py))?;
         named.set_item("accel_bias", self.accel_bias(py))?;
         named.set_item("gravity", self.gravity(py))?;
+        named.set_item("unit", self.unit())?;
         if let Some(motor) = &self.0.head.motor {
             named.set_item("motor_axis", vector(py, &motor.axis))?;
             named.set_item("encoder_zero", motor.zero)?;
@@ -366,7 +405,7 @@ impl Globals {
         Ok(((Transform::of(&self.0.head.T_imu_base),), named))
     }
 
-    /// The correction (20,) that leads from `earlier` to these.
+    /// The correction (44,) that leads from `earlier` to these.
     fn moved_from(&self, earlier: &Self) -> [f64; N_GLOBALS] {
         self.0.moved_from(&earlier.0)
     }
@@ -399,13 +438,20 @@ impl Globals {
     /// Gyro bias, rad/s.
     #[getter]
     fn gyro_bias<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        vector(py, &self.0.gyro_bias)
+        vector(py, &self.0.unit.gyro_bias)
     }
 
     /// Accelerometer bias, m/s².
     #[getter]
     fn accel_bias<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        vector(py, &self.0.accel_bias)
+        vector(py, &self.0.unit.accel_bias)
+    }
+
+    /// How the IMU answers beside its biases: `gyro`, `g_sensitivity` and `accel` row by row,
+    /// `reference` and `main_axis`.
+    #[getter]
+    fn unit(&self) -> Unit {
+        Unit::of(&self.0.unit)
     }
 
     /// Gravity, m/s², map frame, pointing up.

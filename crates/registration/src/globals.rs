@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The slow states that are estimated along with the trajectory.
 
-use bentwing_trajectory::{Head, so3};
-use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use std::ops::Range;
+
+use bentwing_trajectory::{Head, InertialUnit, so3};
+use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
 
 /// Number of global states.
-pub const N_GLOBALS: usize = 20;
+pub const N_GLOBALS: usize = 44;
 /// A vector of all global states or their corrections.
 pub type GlobalVector = [f64; N_GLOBALS];
 /// A matrix over all global states.
@@ -15,35 +17,52 @@ pub type GlobalMatrix = nalgebra::SMatrix<f64, N_GLOBALS, N_GLOBALS>;
 pub mod index {
     use std::ops::Range;
 
+    /// Those that place a surfel: rows of matches within a window concern no others.
+    pub const HEAD: Range<usize> = 0..12;
+    /// Those that inertial samples depend on.
+    pub const INERTIAL: Range<usize> = 12..44;
+
     /// Lidar stamps minus IMU clock, s.
     pub const LATENCY: usize = 0;
     /// `R_imu_base ← Exp(θ) R_imu_base`, rad, imu frame.
     pub const EXTRINSIC_ROTATION: Range<usize> = 1..4;
     /// Translation of `T_imu_base`, m, imu frame.
     pub const EXTRINSIC_TRANSLATION: Range<usize> = 4..7;
-    /// Gyro bias, rad/s.
-    pub const GYRO_BIAS: Range<usize> = 7..10;
-    /// Accelerometer bias, m/s².
-    pub const ACCEL_BIAS: Range<usize> = 10..13;
-    /// Rotation of gravity about the x and y axes of the map, rad.
-    pub const GRAVITY: Range<usize> = 13..15;
     /// Added to every encoder angle, rad.
-    pub const ENCODER_ZERO: usize = 15;
+    pub const ENCODER_ZERO: usize = 7;
     /// Rotation of the lidar about two axes perpendicular to the motor's, rad, motor frame.
-    pub const MOTOR_TILT: Range<usize> = 16..18;
+    pub const MOTOR_TILT: Range<usize> = 8..10;
     /// Translation of the lidar perpendicular to the motor's axis, m, motor frame.
-    pub const MOTOR_OFFSET: Range<usize> = 18..20;
+    pub const MOTOR_OFFSET: Range<usize> = 10..12;
+    /// Gyro bias, rad/s.
+    pub const GYRO_BIAS: Range<usize> = 12..15;
+    /// Accelerometer bias, m/s².
+    pub const ACCEL_BIAS: Range<usize> = 15..18;
+    /// Rotation of gravity about the x and y axes of the map, rad.
+    pub const GRAVITY: Range<usize> = 18..20;
+    /// Share of its rate that is added to each axis of the gyro.
+    pub const GYRO_SCALE: Range<usize> = 20..23;
+    /// How axes of the gyro lean, rad: the pair across the main axis, and the main one to both.
+    pub const GYRO_MISALIGNMENT: Range<usize> = 23..26;
+    /// Row by row, rad/s per m/s².
+    pub const G_SENSITIVITY: Range<usize> = 26..35;
+    /// Share of its force that is added to each axis of the accelerometer.
+    pub const ACCEL_SCALE: Range<usize> = 35..38;
+    /// How axes of the accelerometer lean, rad: to y and z of x, x and z of y, x and y of z.
+    pub const ACCEL_MISALIGNMENT: Range<usize> = 38..44;
 }
+
+/// Places of [`index::ACCEL_MISALIGNMENT`] in the matrix.
+pub(crate) const OFF_DIAGONAL: [(usize, usize); 6] =
+    [(0, 1), (0, 2), (1, 0), (1, 2), (2, 0), (2, 1)];
 
 /// Values of the global states.
 #[derive(Clone, Debug)]
 pub struct Globals {
     /// Latency, extrinsics and motor.
     pub head: Head,
-    /// rad/s, imu frame.
-    pub gyro_bias: Vector3<f64>,
-    /// m/s², imu frame.
-    pub accel_bias: Vector3<f64>,
+    /// How the IMU answers.
+    pub unit: InertialUnit,
     /// m/s², map frame, pointing up.
     pub gravity: Vector3<f64>,
 }
@@ -51,21 +70,20 @@ pub struct Globals {
 impl Globals {
     /// Applies a correction.
     pub fn correct(&mut self, delta: &GlobalVector) {
-        let three = |r: std::ops::Range<usize>| Vector3::from_column_slice(&delta[r]);
+        let three = |r: Range<usize>| Vector3::from_column_slice(&delta[r]);
         let head = &mut self.head;
         head.latency += delta[index::LATENCY];
         let base = &mut head.T_imu_base;
         base.rotation = so3::turned(&three(index::EXTRINSIC_ROTATION), &base.rotation);
         base.translation =
             Translation3::from(base.translation.vector + three(index::EXTRINSIC_TRANSLATION));
-        self.gyro_bias += three(index::GYRO_BIAS);
-        self.accel_bias += three(index::ACCEL_BIAS);
+        correct_unit(&mut self.unit, delta);
         let [gx, gy] = [delta[index::GRAVITY.start], delta[index::GRAVITY.start + 1]];
         self.gravity = so3::exp(&Vector3::new(gx, gy, 0.0)) * self.gravity;
         if let Some(motor) = &mut head.motor {
             motor.zero += delta[index::ENCODER_ZERO];
             let [u, v] = so3::orthogonal_pair(&motor.axis);
-            let pair = |r: std::ops::Range<usize>| u * delta[r.start] + v * delta[r.start + 1];
+            let pair = |r: Range<usize>| u * delta[r.start] + v * delta[r.start + 1];
             let lidar = &mut motor.T_motor_lidar;
             lidar.rotation = so3::turned(&pair(index::MOTOR_TILT), &lidar.rotation);
             lidar.translation =
@@ -76,7 +94,7 @@ impl Globals {
     /// The correction that leads from `earlier` to here.
     pub fn moved_from(&self, earlier: &Self) -> GlobalVector {
         let mut delta = [0.0; N_GLOBALS];
-        let mut set = |place: std::ops::Range<usize>, v: Vector3<f64>| {
+        let mut set = |place: Range<usize>, v: Vector3<f64>| {
             let n = place.len();
             delta[place].copy_from_slice(&v.as_slice()[..n]);
         };
@@ -86,12 +104,11 @@ impl Globals {
         let (a, b) = (&self.head.T_imu_base, &earlier.head.T_imu_base);
         set(index::EXTRINSIC_ROTATION, turn(a.rotation, b.rotation));
         set(index::EXTRINSIC_TRANSLATION, shift(a, b));
-        set(index::GYRO_BIAS, self.gyro_bias - earlier.gyro_bias);
-        set(index::ACCEL_BIAS, self.accel_bias - earlier.accel_bias);
         set(
             index::GRAVITY,
             turn_about_x_and_y(&earlier.gravity, &self.gravity),
         );
+        unit_moved(&self.unit, &earlier.unit, &mut delta);
         delta[index::LATENCY] = self.head.latency - earlier.head.latency;
         if let (Some(now), Some(then)) = (&self.head.motor, &earlier.head.motor) {
             delta[index::ENCODER_ZERO] = now.zero - then.zero;
@@ -104,6 +121,44 @@ impl Globals {
         }
         delta
     }
+}
+
+fn correct_unit(unit: &mut InertialUnit, delta: &GlobalVector) {
+    let three = |r: Range<usize>| Vector3::from_column_slice(&delta[r]);
+    unit.gyro_bias += three(index::GYRO_BIAS);
+    unit.accel_bias += three(index::ACCEL_BIAS);
+    for axis in 0..3 {
+        unit.gyro[(axis, axis)] += delta[index::GYRO_SCALE.start + axis];
+        unit.accel[(axis, axis)] += delta[index::ACCEL_SCALE.start + axis];
+    }
+    unit.misalign(&three(index::GYRO_MISALIGNMENT));
+    unit.g_sensitivity += Matrix3::from_row_slice(&delta[index::G_SENSITIVITY]);
+    for (place, d) in OFF_DIAGONAL.iter().zip(&delta[index::ACCEL_MISALIGNMENT]) {
+        unit.accel[*place] += d;
+    }
+}
+
+/// Writes the states of the unit into the correction that leads from `earlier` to `unit`.
+fn unit_moved(unit: &InertialUnit, earlier: &InertialUnit, delta: &mut GlobalVector) {
+    let (gyro, accel) = (unit.gyro - earlier.gyro, unit.accel - earlier.accel);
+    let forces = unit.g_sensitivity - earlier.g_sensitivity;
+    let mut set = |place: Range<usize>, v: &[f64]| delta[place].copy_from_slice(v);
+    set(
+        index::GYRO_BIAS,
+        (unit.gyro_bias - earlier.gyro_bias).as_slice(),
+    );
+    set(
+        index::ACCEL_BIAS,
+        (unit.accel_bias - earlier.accel_bias).as_slice(),
+    );
+    set(index::GYRO_SCALE, gyro.diagonal().as_slice());
+    set(
+        index::GYRO_MISALIGNMENT,
+        &unit.misalignments().map(|p| gyro[p[0]]),
+    );
+    set(index::G_SENSITIVITY, forces.transpose().as_slice());
+    set(index::ACCEL_SCALE, accel.diagonal().as_slice());
+    set(index::ACCEL_MISALIGNMENT, &OFF_DIAGONAL.map(|p| accel[p]));
 }
 
 /// The rotation about x and y that turns the direction of `from` to that of `to`.
@@ -141,8 +196,9 @@ mod tests {
     proptest! {
         #[test]
         fn the_way_back_is_the_correction(
-            scene in Scene::any(), delta in prop::array::uniform20(-0.3..0.3_f64),
+            scene in Scene::any(), delta in prop::collection::vec(-0.3..0.3_f64, N_GLOBALS),
         ) {
+            let delta: GlobalVector = delta.try_into().unwrap();
             let mut corrected = scene.globals.clone();
             corrected.correct(&delta);
             let found = corrected.moved_from(&scene.globals);

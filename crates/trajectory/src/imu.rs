@@ -17,33 +17,39 @@ pub struct Imu {
     /// Cumulative trapezoid of the gyro at its own stamps, rad. Averaging the samples that fall
     /// in an interval instead would be centred half a sample off and read as latency.
     turned: Vec<Vector3<f64>>,
+    /// The same of the accelerometer, m/s.
+    pushed: Vec<Vector3<f64>>,
 }
 
-/// Mean specific force around one sample of the trajectory, seen from the IMU at that sample.
+/// Integrals of the samples over an interval, imu frame, errors of the unit included.
+#[derive(Clone, Copy, Debug)]
+pub struct Increment {
+    /// Of the gyro, rad.
+    pub turned: Vector3<f64>,
+    /// Of the accelerometer, m/s.
+    pub pushed: Vector3<f64>,
+}
+
+/// Mean specific force around one sample of the trajectory, seen from the IMU at that sample, errors
+/// of the unit included: its linear parts, so that each error enters exactly.
 #[derive(Clone, Copy, Debug)]
 pub struct NodeForce {
-    /// `Σ w_k R_nᵀ R(t_k) f_k`, m/s², biases included.
-    pub force: Vector3<f64>,
-    /// `Σ w_k R_nᵀ R(t_k)`: how a constant bias of the accelerometer enters `force`.
-    pub bias_gain: Matrix3<f64>,
+    /// `Σ w_k f_kj R_nᵀ R(t_k)` of each axis j, m/s²; the columns j add up to the mean force.
+    pub by_axis: [Matrix3<f64>; 3],
+    /// `Σ w_k R_nᵀ R(t_k)`: how a constant enters.
+    pub gain: Matrix3<f64>,
 }
 
 impl Imu {
     /// Takes samples with increasing `times`; all slices have the same length.
     pub fn new(times: Vec<f64>, gyro: Vec<Vector3<f64>>, accel: Vec<Vector3<f64>>) -> Self {
-        let mut sum = Vector3::zeros();
-        let mut turned = Vec::with_capacity(times.len());
-        for k in 0..times.len() {
-            if k > 0 {
-                sum += (gyro[k] + gyro[k - 1]) * (0.5 * (times[k] - times[k - 1]));
-            }
-            turned.push(sum);
-        }
+        let (turned, pushed) = (integral(&times, &gyro), integral(&times, &accel));
         Self {
             times,
             gyro,
             accel,
             turned,
+            pushed,
         }
     }
 
@@ -74,18 +80,25 @@ impl Imu {
         (self.times[after] - self.times[after - 1] <= MAX_GAP).then_some(after - 1)
     }
 
-    /// Integral of the gyro from the first sample to `t`, rad, imu frame.
-    fn turned_until(&self, t: f64) -> Option<Vector3<f64>> {
+    /// Integrals of the samples from the first one to `t`.
+    fn until(&self, t: f64) -> Option<Increment> {
         let k = self.bracket(t)?;
         let width = self.times[k + 1] - self.times[k];
         let s = t - self.times[k];
-        let rate = self.gyro[k] + (self.gyro[k + 1] - self.gyro[k]) * (0.5 * s / width);
-        Some(self.turned[k] + rate * s)
+        let mean = |v: &[Vector3<f64>]| v[k] + (v[k + 1] - v[k]) * (0.5 * s / width);
+        Some(Increment {
+            turned: self.turned[k] + mean(&self.gyro) * s,
+            pushed: self.pushed[k] + mean(&self.accel) * s,
+        })
     }
 
-    /// Integral of the gyro over `[from, to]`, rad, imu frame, bias included; `None` in a gap.
-    pub fn rotation_increment(&self, from: f64, to: f64) -> Option<Vector3<f64>> {
-        Some(self.turned_until(to)? - self.turned_until(from)?)
+    /// Integrals of the samples over `[from, to]`; `None` in a gap.
+    pub fn increment(&self, from: f64, to: f64) -> Option<Increment> {
+        let (first, last) = (self.until(from)?, self.until(to)?);
+        Some(Increment {
+            turned: last.turned - first.turned,
+            pushed: last.pushed - first.pushed,
+        })
     }
 
     /// Triangular mean of the specific force over `±dt` around sample `n`, which is what the
@@ -97,24 +110,28 @@ impl Imu {
         let first = self.times.partition_point(|&s| s <= t - dt);
         let last = self.times.partition_point(|&s| s < t + dt);
         let mut node = NodeForce {
-            force: Vector3::zeros(),
-            bias_gain: Matrix3::zeros(),
+            by_axis: [Matrix3::zeros(); 3],
+            gain: Matrix3::zeros(),
         };
         let mut total = 0.0;
         for k in first.max(1)..last.min(self.len() - 1) {
             let span = self.times[k + 1] - self.times[k - 1];
             let weight = (1.0 - (self.times[k] - t).abs() / dt) * span;
-            let R = relative_rotation(trajectory, n, self.times[k]);
-            node.force += R * self.accel[k] * weight;
-            node.bias_gain += R * weight;
+            let R = relative_rotation(trajectory, n, self.times[k]) * weight;
+            for (part, f) in node.by_axis.iter_mut().zip(self.accel[k].iter()) {
+                *part += R * *f;
+            }
+            node.gain += R;
             total += weight;
         }
         // Fewer samples than nodes: the nearest straight line between samples stands in.
         if total <= 0.0 {
             return self.interpolated_force(t);
         }
-        node.force /= total;
-        node.bias_gain /= total;
+        for part in &mut node.by_axis {
+            *part /= total;
+        }
+        node.gain /= total;
         Some(node)
     }
 
@@ -123,10 +140,23 @@ impl Imu {
         let u = (t - self.times[k]) / (self.times[k + 1] - self.times[k]);
         let force = self.accel[k] + (self.accel[k + 1] - self.accel[k]) * u;
         Some(NodeForce {
-            force,
-            bias_gain: Matrix3::identity(),
+            by_axis: [force.x, force.y, force.z].map(Matrix3::from_diagonal_element),
+            gain: Matrix3::identity(),
         })
     }
+}
+
+/// Cumulative trapezoid.
+fn integral(times: &[f64], values: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+    let mut sum = Vector3::zeros();
+    let mut sums = Vec::with_capacity(times.len());
+    for k in 0..times.len() {
+        if k > 0 {
+            sum += (values[k] + values[k - 1]) * (0.5 * (times[k] - times[k - 1]));
+        }
+        sums.push(sum);
+    }
+    sums
 }
 
 /// `R_nᵀ R(t)` for `t` within one interval of sample `n`.
@@ -144,6 +174,7 @@ fn relative_rotation(trajectory: &Trajectory, n: usize, t: f64) -> Matrix3<f64> 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::InertialUnit;
 
     fn uniform(rate_hz: f64, phase: f64, seconds: f64) -> Vec<f64> {
         (0..(seconds * rate_hz) as usize)
@@ -160,7 +191,7 @@ mod tests {
             .collect();
         let accel = vec![Vector3::zeros(); times.len()];
         let imu = Imu::new(times, gyro, accel);
-        let angle = imu.rotation_increment(0.1, 0.2047).unwrap().x;
+        let angle = imu.increment(0.1, 0.2047).unwrap().turned.x;
         let exact = 0.1047 + (0.2047_f64.powi(2) - 0.1_f64.powi(2));
         assert!((angle - exact).abs() < 1e-12);
     }
@@ -171,9 +202,9 @@ mod tests {
         times.retain(|&t| !(0.4..0.6).contains(&t));
         let n = times.len();
         let imu = Imu::new(times, vec![Vector3::z(); n], vec![Vector3::zeros(); n]);
-        assert!(imu.rotation_increment(0.1, 0.2).is_some());
-        assert!(imu.rotation_increment(0.3, 0.5).is_none());
-        assert!(imu.rotation_increment(0.9, 1.1).is_none());
+        assert!(imu.increment(0.1, 0.2).is_some());
+        assert!(imu.increment(0.3, 0.5).is_none());
+        assert!(imu.increment(0.9, 1.1).is_none());
     }
 
     #[test]
@@ -193,7 +224,8 @@ mod tests {
                 .collect();
             let imu = Imu::new(times.clone(), vec![rate; times.len()], accel);
             let node = imu.node_force(&trajectory, 50).unwrap();
-            assert!((trajectory.rotations()[50] * node.force - force).norm() < 1e-9);
+            let felt = InertialUnit::ideal().force(&node);
+            assert!((trajectory.rotations()[50] * felt - force).norm() < 1e-9);
         }
     }
 }

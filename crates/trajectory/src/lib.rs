@@ -9,9 +9,11 @@ mod propagation;
 mod samples;
 pub mod se3;
 pub mod so3;
+mod unit;
 
 pub use correction_spline::{Basis, CorrectionSpline, StencilWeights};
 pub use head::{Head, Motor};
-pub use imu::{Imu, NodeForce};
+pub use imu::{Imu, Increment, NodeForce};
 pub use propagation::{extend_constant_velocity, extend_inertial};
 pub use samples::{Pose, Trajectory, TrajectoryError};
+pub use unit::InertialUnit;

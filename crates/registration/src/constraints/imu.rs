@@ -1,23 +1,28 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The trajectory turns and accelerates as the IMU measured, sample by sample.
 
-use bentwing_trajectory::{CorrectionSpline, Imu, NodeForce, Trajectory, so3};
+use bentwing_trajectory::{
+    CorrectionSpline, Imu, Increment, InertialUnit, NodeForce, Trajectory, so3,
+};
 use nalgebra::{Matrix3, Vector3};
 
 use super::stencil::{StencilRows, add_stencil};
+use crate::globals::OFF_DIAGONAL;
 use crate::{GlobalVector, Globals, ImuNoise, N_GLOBALS, NormalEquations, index};
 
-/// `e = dθ_n/dt − b_g − Log(R_nᵀ R_{n+1})/dt`, rad/s, imu frame.
+/// `e = dθ_n/dt − Log(R_nᵀ R_{n+1})/dt`, with the turn as the unit means it, rad/s, imu frame.
 pub fn gyro_residual(
     trajectory: &Trajectory,
     globals: &Globals,
     n: usize,
-    turned: &Vector3<f64>,
+    said: &Increment,
 ) -> Vector3<f64> {
-    (turned - trajectory.steps()[n]) / trajectory.dt() - globals.gyro_bias
+    let dt = trajectory.dt();
+    (globals.unit.turn(said, dt) - trajectory.steps()[n]) / dt
 }
 
-/// `e = F_n − M_n b_a − R_nᵀ (a_n + g)`, m/s², imu frame; `1 <= n < len - 1`.
+/// `e = F_n − R_nᵀ (a_n + g)`, with the force as the unit means it, m/s², imu frame;
+/// `1 <= n < len - 1`.
 pub fn accel_residual(
     trajectory: &Trajectory,
     globals: &Globals,
@@ -25,7 +30,7 @@ pub fn accel_residual(
     node: &NodeForce,
 ) -> Vector3<f64> {
     let force = trajectory.acceleration(n) + globals.gravity;
-    node.force - node.bias_gain * globals.accel_bias - trajectory.rotations()[n].inverse() * force
+    globals.unit.force(node) - trajectory.rotations()[n].inverse() * force
 }
 
 /// What the IMU says at one sample: three rows of the control points `first .. first + 5`.
@@ -41,7 +46,9 @@ impl SampleRows {
         let group = rows.group(self.first);
         for row in 0..3 {
             group.knots_mut().copy_from_slice(&self.knots[row]);
-            group.globals_mut().copy_from_slice(&self.globals[row]);
+            group
+                .globals_mut()
+                .copy_from_slice(&self.globals[row][index::INERTIAL]);
             group.add(self.residual[row], sigma.powi(-2));
         }
     }
@@ -81,8 +88,8 @@ pub(crate) fn gyro_rows(
     spline: &CorrectionSpline,
     n: usize,
 ) -> Option<SampleRows> {
-    let turned = imu.rotation_increment(trajectory.time(n), trajectory.time(n + 1))?;
-    Some(gyro_rows_of(trajectory, globals, spline, n, &turned))
+    let said = imu.increment(trajectory.time(n), trajectory.time(n + 1))?;
+    Some(gyro_rows_of(trajectory, globals, spline, n, &said))
 }
 
 /// What the accelerometer says around sample `n`; `None` in a gap. `1 <= n < len - 1`.
@@ -102,7 +109,7 @@ fn gyro_rows_of(
     globals: &Globals,
     spline: &CorrectionSpline,
     n: usize,
-    turned: &Vector3<f64>,
+    said: &Increment,
 ) -> SampleRows {
     let dt = trajectory.dt();
     let times = [trajectory.time(n), trajectory.time(n + 1)];
@@ -111,15 +118,53 @@ fn gyro_rows_of(
     let J = -so3::right_jacobian_inverse(&trajectory.steps()[n]) * R_next.transpose();
     let mut rows = SampleRows {
         first: stencil.first,
-        residual: gyro_residual(trajectory, globals, n, turned),
+        residual: gyro_residual(trajectory, globals, n, said),
         knots: [[0.0; 30]; 3],
         globals: [[0.0; N_GLOBALS]; 3],
     };
     for row in 0..3 {
         add_stencil(&mut rows.knots[row], &stencil, &J, row, 0);
-        rows.globals[row][index::GYRO_BIAS.start + row] = -1.0;
     }
+    add_gyro_states(&mut rows.globals, &globals.unit, said, dt);
     rows
+}
+
+/// Derivatives of the mean rate by what the unit's gyro does.
+fn add_gyro_states(rows: &mut [GlobalVector; 3], unit: &InertialUnit, said: &Increment, dt: f64) {
+    let rate = said.turned / dt - unit.gyro_bias;
+    let force = said.pushed / dt - unit.reference;
+    let bias = -(Matrix3::identity() + unit.gyro);
+    for (row, entries) in rows.iter_mut().enumerate() {
+        for c in 0..3 {
+            entries[index::GYRO_BIAS.start + c] = bias[(row, c)];
+            entries[index::G_SENSITIVITY.start + 3 * row + c] = -force[c];
+        }
+        entries[index::GYRO_SCALE.start + row] = rate[row];
+    }
+    for (k, places) in unit.misalignments().iter().enumerate() {
+        for &(row, c) in places {
+            rows[row][index::GYRO_MISALIGNMENT.start + k] = rate[c];
+        }
+    }
+}
+
+/// Derivatives of the mean force by what the unit's accelerometer does.
+fn add_accel_states(rows: &mut [GlobalVector; 3], unit: &InertialUnit, node: &NodeForce) {
+    // Of the force by the entry (i, j) of the matrix.
+    let by = |(i, j): (usize, usize)| {
+        node.by_axis[j].column(i) - node.gain.column(i) * unit.reference[j]
+    };
+    let scales = [0, 1, 2].map(|axis| by((axis, axis)));
+    let leans = OFF_DIAGONAL.map(by);
+    for (row, entries) in rows.iter_mut().enumerate() {
+        for (c, scale) in scales.iter().enumerate() {
+            entries[index::ACCEL_BIAS.start + c] = -node.gain[(row, c)];
+            entries[index::ACCEL_SCALE.start + c] = scale[row];
+        }
+        for (c, lean) in leans.iter().enumerate() {
+            entries[index::ACCEL_MISALIGNMENT.start + c] = lean[row];
+        }
+    }
 }
 
 fn accel_rows_of(
@@ -147,14 +192,11 @@ fn accel_rows_of(
     for row in 0..3 {
         add_stencil(&mut rows.knots[row], &curvature, &-R_imu_map, row, 3);
         add_stencil(&mut rows.knots[row], &value, &J_rotation, row, 0);
-        let g = &mut rows.globals[row];
-        for c in 0..3 {
-            g[index::ACCEL_BIAS.start + c] = -node.bias_gain[(row, c)];
-        }
         for c in 0..2 {
-            g[index::GRAVITY.start + c] = J_gravity[(row, c)];
+            rows.globals[row][index::GRAVITY.start + c] = J_gravity[(row, c)];
         }
     }
+    add_accel_states(&mut rows.globals, &globals.unit, node);
     rows
 }
 
@@ -167,25 +209,29 @@ mod tests {
     proptest! {
         #[test]
         fn gyro_rows_agree_with_central_differences(scene in Scene::any(), n in 1..40_usize) {
-            let turned = Vector3::new(0.01, -0.03, 0.05);
+            let said = Increment {
+                turned: Vector3::new(0.01, -0.03, 0.05),
+                pushed: Vector3::new(0.02, 0.01, 0.09),
+            };
             let sigma = 0.7;
             assert_rows(
                 &scene,
                 |equations| {
                     let mut rows = StencilRows::new(equations);
                     let (t, g) = (&scene.trajectory, &scene.globals);
-                    gyro_rows_of(t, g, &scene.spline(), n, &turned).add(&mut rows, sigma);
+                    gyro_rows_of(t, g, &scene.spline(), n, &said).add(&mut rows, sigma);
                     rows.flush();
                 },
-                |t, g| (gyro_residual(t, g, n, &turned) / sigma).as_slice().to_vec(),
+                |t, g| (gyro_residual(t, g, n, &said) / sigma).as_slice().to_vec(),
             )?;
         }
 
         #[test]
         fn accelerometer_rows_agree_with_central_differences(scene in Scene::any(), n in 1..40_usize) {
+            let turned = |angle: f64| so3::matrix(&so3::exp(&Vector3::new(angle, 0.02, -0.03)));
             let node = NodeForce {
-                force: Vector3::new(0.3, -1.0, 9.0),
-                bias_gain: Matrix3::identity() * 0.98,
+                by_axis: [turned(0.1) * 0.3, turned(-0.2) * -1.0, turned(0.05) * 9.0],
+                gain: turned(0.07) * 0.98,
             };
             let sigma = 0.3;
             assert_rows(

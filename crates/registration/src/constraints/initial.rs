@@ -21,7 +21,7 @@ pub const LOOSE: Sigmas = [0.1, 0.1, 0.1, 1.0, 1.0, 1.0];
 /// Adds `δ(t) = 0` at the start `t` of the trajectory; its velocity stays free.
 pub fn add(equations: &mut NormalEquations, spline: &CorrectionSpline, t: f64, sigmas: &Sigmas) {
     let basis = spline.basis(t);
-    let mut group = RowGroup::new(basis.first..basis.first + 4);
+    let mut group = RowGroup::of(basis.first..basis.first + 4, 0..0);
     for (part, sigma) in sigmas.iter().enumerate() {
         group.clear_row();
         let knots = group.knots_mut();

@@ -4,9 +4,10 @@
 use bentwing_trajectory::StencilWeights;
 use nalgebra::Matrix3;
 
-use crate::{NormalEquations, RowGroup};
+use crate::{NormalEquations, RowGroup, index};
 
-/// Rows of neighbouring samples of the trajectory, which mostly share their five control points.
+/// Rows of neighbouring samples of the trajectory, which mostly share their five control points. Of
+/// the global states they concern the inertial ones.
 pub(crate) struct StencilRows<'a> {
     equations: &'a mut NormalEquations,
     first: usize,
@@ -18,7 +19,7 @@ impl<'a> StencilRows<'a> {
         Self {
             equations,
             first: usize::MAX,
-            group: RowGroup::new([]),
+            group: RowGroup::of([], index::INERTIAL),
         }
     }
 
@@ -27,7 +28,7 @@ impl<'a> StencilRows<'a> {
         if self.first != first {
             self.flush();
             self.first = first;
-            self.group.reset(first..first + 5);
+            self.group.reset(first..first + 5, index::INERTIAL);
         }
         &mut self.group
     }
@@ -35,7 +36,7 @@ impl<'a> StencilRows<'a> {
     pub fn flush(&mut self) {
         self.group.flush(self.equations);
         self.first = usize::MAX;
-        self.group.reset([]);
+        self.group.reset([], index::INERTIAL);
     }
 }
 

@@ -2,7 +2,7 @@
 //! Scenes with large angles and the comparison of Jacobians with central differences.
 
 use bentwing_surfels::SurfelSet;
-use bentwing_trajectory::{CorrectionSpline, Head, Motor, Trajectory, so3};
+use bentwing_trajectory::{CorrectionSpline, Head, InertialUnit, Motor, Trajectory, so3};
 use nalgebra::{Isometry3, Matrix3, Vector3};
 use proptest::prelude::*;
 use proptest::test_runner::TestCaseError;
@@ -53,39 +53,53 @@ impl Scene {
             vector(1.5),
             vector(1.5),
             vector(2.0),
+            0..3_usize,
         )
-            .prop_map(|(rate, velocity, start, extrinsic, mount, axis)| {
-                let pose = |n: i32| {
-                    let t = 0.01 * f64::from(n);
-                    let wobble = Vector3::new((9.0 * t).sin(), (7.0 * t).cos(), t) * 0.1;
-                    (
-                        velocity * t + wobble,
-                        so3::exp(&start) * so3::exp(&(rate * t + wobble)),
-                    )
-                };
-                let (positions, rotations) = (0..51).map(pose).unzip();
-                let motor = Motor {
-                    axis: axis.try_normalize(1e-3).unwrap_or_else(Vector3::z),
-                    zero: 0.4,
-                    T_motor_lidar: Isometry3::new(Vector3::new(0.05, 0.1, -0.02), mount),
-                };
-                let head = Head {
-                    T_imu_base: Isometry3::new(Vector3::new(0.1, -0.2, 0.05), extrinsic),
-                    latency: 0.002,
-                    motor: Some(motor),
-                };
-                let globals = Globals {
-                    head,
-                    gyro_bias: Vector3::new(0.01, 0.02, -0.03),
-                    accel_bias: Vector3::new(0.1, -0.05, 0.02),
-                    gravity: Vector3::new(0.1, -0.05, 9.8),
-                };
-                let trajectory = Trajectory::new(2.0, 0.01, positions, rotations).unwrap();
-                Self {
-                    trajectory,
-                    globals,
-                }
-            })
+            .prop_map(
+                |(rate, velocity, start, extrinsic, mount, axis, main_axis)| {
+                    let pose = |n: i32| {
+                        let t = 0.01 * f64::from(n);
+                        let wobble = Vector3::new((9.0 * t).sin(), (7.0 * t).cos(), t) * 0.1;
+                        (
+                            velocity * t + wobble,
+                            so3::exp(&start) * so3::exp(&(rate * t + wobble)),
+                        )
+                    };
+                    let (positions, rotations) = (0..51).map(pose).unzip();
+                    let motor = Motor {
+                        axis: axis.try_normalize(1e-3).unwrap_or_else(Vector3::z),
+                        zero: 0.4,
+                        T_motor_lidar: Isometry3::new(Vector3::new(0.05, 0.1, -0.02), mount),
+                    };
+                    let head = Head {
+                        T_imu_base: Isometry3::new(Vector3::new(0.1, -0.2, 0.05), extrinsic),
+                        latency: 0.002,
+                        motor: Some(motor),
+                    };
+                    let unit = InertialUnit {
+                        gyro_bias: Vector3::new(0.01, 0.02, -0.03),
+                        accel_bias: Vector3::new(0.1, -0.05, 0.02),
+                        gyro: Matrix3::new(0.03, 0.05, 0.0, 0.05, -0.04, 0.0, 0.06, -0.02, 0.01),
+                        g_sensitivity: Matrix3::new(3.0, -1.0, 2.0, 1.0, 4.0, -2.0, 0.5, 1.5, -3.0)
+                            * 1e-3,
+                        accel: Matrix3::new(
+                            0.02, -0.05, 0.04, 0.01, 0.03, -0.02, 0.05, 0.02, -0.01,
+                        ),
+                        reference: Vector3::new(0.5, -0.3, 9.6),
+                        main_axis,
+                    };
+                    let globals = Globals {
+                        head,
+                        unit,
+                        gravity: Vector3::new(0.1, -0.05, 9.8),
+                    };
+                    let trajectory = Trajectory::new(2.0, 0.01, positions, rotations).unwrap();
+                    Self {
+                        trajectory,
+                        globals,
+                    }
+                },
+            )
     }
 
     /// A second of motion with a pause of `seconds`.

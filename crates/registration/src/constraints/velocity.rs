@@ -9,7 +9,7 @@ use crate::{NormalEquations, RowGroup, Settings};
 /// correction of the velocity.
 pub fn add(equations: &mut NormalEquations, spline: &CorrectionSpline, settings: &Settings) {
     for m in 0..spline.n_controls() - 1 {
-        let mut group = RowGroup::new([m, m + 1]);
+        let mut group = RowGroup::of([m, m + 1], 0..0);
         for part in 0..6 {
             let sigma = if part < 3 {
                 settings.rate_sigma

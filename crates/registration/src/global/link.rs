@@ -10,13 +10,13 @@ use pulp::{Simd, WithSimd};
 
 use super::bend;
 use super::chunk::Laid;
-use super::joint::{Joint, N_STAND_INS};
+use super::joint::{Joint, N_HEAD_STAND_INS};
 use crate::constraints::surfel_match::{self, MatchPlane};
 use crate::neighbors::{Search, claimed_pairs};
 use crate::placed::PlacedSurfel;
 use crate::robust::cauchy_weight;
 use crate::state::State;
-use crate::{Health, N_GLOBALS, NormalEquations, RowGroup, Settings};
+use crate::{Health, NormalEquations, RowGroup, Settings, index};
 
 /// A surfel of the one stretch, one of the other, and their plane.
 #[derive(Clone, Copy, Debug)]
@@ -130,7 +130,7 @@ impl Places {
         }
         let stand_in = (p != q).then_some(controls.len());
         if p != q {
-            controls.extend((0..N_STAND_INS).map(|s| joint.stand_in(q) + s));
+            controls.extend((0..N_HEAD_STAND_INS).map(|s| joint.stand_in(q) + s));
         }
         Self {
             first,
@@ -187,7 +187,7 @@ impl LinkSum<'_> {
     fn sum(&self) -> LinkEquations {
         let places = Places::new(self.link, self.laid, self.joint);
         let mut equations = NormalEquations::new(places.controls.len());
-        let (mut rows, mut health) = (RowGroup::new([]), Health::default());
+        let (mut rows, mut health) = (RowGroup::of([], index::HEAD), Health::default());
         let group = |m: &LinkMatch| {
             let [s, t] = self.surfels(m);
             (places.of_first(s), places.of_second(t))
@@ -196,9 +196,12 @@ impl LinkSum<'_> {
         ordered.sort_by_key(|&(group, _)| group);
         for of_group in ordered.chunk_by(|a, b| a.0 == b.0) {
             let (first, second) = of_group[0].0;
-            let stand_ins = places.stand_in.into_iter().flat_map(|s| s..s + N_STAND_INS);
+            let stand_ins = places
+                .stand_in
+                .into_iter()
+                .flat_map(|s| s..s + N_HEAD_STAND_INS);
             let controls = (first..first + 4).chain(second..second + 4);
-            rows.reset(controls.chain(stand_ins));
+            rows.reset(controls.chain(stand_ins), index::HEAD);
             for (_, m) in of_group {
                 self.add_row(m, &mut rows, &mut health);
             }
@@ -234,7 +237,7 @@ impl LinkSum<'_> {
         } else {
             let stand_ins = &mut rows.knots_mut()[48..];
             stand_ins.fill(0.0);
-            surfel_match::add_globals(&mut stand_ins[..N_GLOBALS], heads[1], other, n, -1.0);
+            surfel_match::add_globals(stand_ins, heads[1], other, n, -1.0);
         }
         let residual = n.dot(&(surfel.mean - other.mean)) + m.offset;
         let x = residual * m.plane.information.sqrt();

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use bentwing_surfels::SurfelSet;
-use bentwing_trajectory::{Head, Trajectory, so3};
+use bentwing_trajectory::{Head, InertialUnit, Trajectory, so3};
 use nalgebra::{DMatrix, Isometry3, Matrix3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
@@ -87,8 +87,7 @@ fn globals() -> Globals {
             latency: 0.002,
             motor: None,
         },
-        gyro_bias: Vector3::zeros(),
-        accel_bias: Vector3::zeros(),
+        unit: InertialUnit::ideal(),
         gravity: Vector3::z() * 9.8,
     }
 }

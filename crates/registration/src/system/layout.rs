@@ -51,7 +51,12 @@ impl Layout {
             i if index::GRAVITY.contains(&i) => "gravity direction",
             index::ENCODER_ZERO => "encoder zero",
             i if index::MOTOR_TILT.contains(&i) => "motor tilt",
-            _ => "motor offset",
+            i if index::MOTOR_OFFSET.contains(&i) => "motor offset",
+            i if index::GYRO_SCALE.contains(&i) => "gyro scale",
+            i if index::GYRO_MISALIGNMENT.contains(&i) => "gyro misalignment",
+            i if index::G_SENSITIVITY.contains(&i) => "sensitivity of the gyro to forces",
+            i if index::ACCEL_SCALE.contains(&i) => "accelerometer scale",
+            _ => "accelerometer misalignment",
         };
         format!("the {name}")
     }

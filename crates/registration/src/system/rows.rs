@@ -6,6 +6,8 @@
     reason = "only what is inlined into a dispatched function uses the machine's instructions"
 )]
 
+use std::ops::Range;
+
 use faer::linalg::matmul::triangular::{BlockStructure, matmul};
 use faer::{Accum, Mat, MatRef, Par};
 
@@ -17,10 +19,11 @@ const GATHERED: usize = 96;
 
 /// `Σ w Jᵀ J` and `Σ w Jᵀ r` of rows that share their control points.
 ///
-/// A row is six entries per control point, the global states, and the residual.
+/// A row is six entries per control point, the global states it concerns, and the residual.
 #[derive(Clone, Debug)]
 pub struct RowGroup {
     controls: Vec<usize>,
+    globals: Range<usize>,
     width: usize,
     /// Rows times the roots of their weights, one after the other, and the row being filled.
     gathered: Vec<f64>,
@@ -32,25 +35,32 @@ pub struct RowGroup {
 }
 
 impl RowGroup {
-    /// A group for the control points `controls`, which may repeat.
+    /// A group for the control points `controls`, which may repeat, and all global states.
     pub fn new(controls: impl IntoIterator<Item = usize>) -> Self {
+        Self::of(controls, 0..N_GLOBALS)
+    }
+
+    /// A group for the control points `controls`, which may repeat, and some of the global states.
+    pub fn of(controls: impl IntoIterator<Item = usize>, globals: Range<usize>) -> Self {
         let mut group = Self {
             controls: Vec::new(),
+            globals: 0..0,
             width: 0,
             gathered: Vec::new(),
             current: 0,
             sum: Mat::new(),
             is_empty: true,
         };
-        group.reset(controls);
+        group.reset(controls, globals);
         group
     }
 
-    /// Forgets all rows, and takes other control points; keeps its memory.
-    pub fn reset(&mut self, controls: impl IntoIterator<Item = usize>) {
+    /// Forgets all rows, and takes other control points and global states; keeps its memory.
+    pub fn reset(&mut self, controls: impl IntoIterator<Item = usize>, globals: Range<usize>) {
         self.controls.clear();
         self.controls.extend(controls);
-        self.width = 6 * self.controls.len() + N_GLOBALS + 1;
+        self.width = 6 * self.controls.len() + globals.len() + 1;
+        self.globals = globals;
         self.gathered.resize(self.width, 0.0);
         self.current = 0;
         if self.sum.nrows() != self.width {
@@ -70,10 +80,10 @@ impl RowGroup {
         &mut self.row_mut()[..n]
     }
 
-    /// The entries of the global states in the row.
+    /// The entries of its global states in the row.
     pub fn globals_mut(&mut self) -> &mut [f64] {
-        let first = 6 * self.controls.len();
-        &mut self.row_mut()[first..first + N_GLOBALS]
+        let (first, last) = (6 * self.controls.len(), self.width - 1);
+        &mut self.row_mut()[first..last]
     }
 
     fn row_mut(&mut self) -> &mut [f64] {
@@ -87,7 +97,7 @@ impl RowGroup {
         let (row_knots, row_globals) = row.split_at(6 * self.controls.len());
         let entries = row_knots.chunks_exact(6).zip(&self.controls);
         let sum: f64 = entries.map(|(e, &k)| product(e, &knots[k])).sum();
-        sum + product(row_globals, globals)
+        sum + product(row_globals, &globals[self.globals.clone()])
     }
 
     /// Adds the current row with residual `r` and weight `w`.
@@ -154,16 +164,18 @@ impl RowGroup {
                 let column = self.column(6 * a + r);
                 equations.knot_gradient_mut(row_control)[r] += column[residual];
                 let arrow = equations.arrow_mut(row_control);
-                for (g, v) in column[first_global..residual].iter().enumerate() {
-                    arrow[g][r] += v;
+                let arrow = arrow[self.globals.clone()].iter_mut();
+                for (to, v) in arrow.zip(&column[first_global..residual]) {
+                    to[r] += v;
                 }
             }
         }
-        for c in 0..N_GLOBALS {
+        let first = self.globals.start;
+        for c in 0..self.globals.len() {
             let column = self.column(first_global + c);
-            equations.global_gradient[c] += column[residual];
-            for r in c..N_GLOBALS {
-                equations.add_corner(r, c, column[first_global + r]);
+            equations.global_gradient[first + c] += column[residual];
+            for r in c..self.globals.len() {
+                equations.add_corner(first + r, first + c, column[first_global + r]);
             }
         }
     }

@@ -16,7 +16,7 @@ use crate::neighbors::{Grid, claimed_pairs, mutual_pairs};
 use crate::placed::{Placed, grid_of};
 use crate::robust::cauchy_weight;
 use crate::{
-    GlobalVector, Globals, Health, N_GLOBALS, NormalEquations, RowGroup, Settings, Solution,
+    GlobalVector, Globals, Health, N_GLOBALS, NormalEquations, RowGroup, Settings, Solution, index,
 };
 
 /// What a surfel is matched to.
@@ -203,10 +203,13 @@ impl<'a> MatchRows<'a> {
         scale: f64,
     ) -> (NormalEquations, Health) {
         let mut equations = NormalEquations::new(n_controls);
-        let (mut sum, mut health) = (RowGroup::new([]), Health::default());
+        let (mut sum, mut health) = (RowGroup::of([], index::HEAD), Health::default());
         for rows in rows.chunk_by(|a, b| a.group == b.group) {
             let (first, other) = rows[0].group;
-            sum.reset((first..first + 4).chain(other.into_iter().flat_map(|f| f..f + 4)));
+            // The poses of a view follow all of them.
+            let globals = other.map_or(0..N_GLOBALS, |_| index::HEAD);
+            let controls = (first..first + 4).chain(other.into_iter().flat_map(|f| f..f + 4));
+            sum.reset(controls, globals);
             for row in rows {
                 self.add_row(row, &mut sum, &mut health, step, scale);
             }

@@ -3,7 +3,7 @@
 use super::*;
 use crate::constraints::testing::settings;
 use crate::{NormalEquations, RowGroup, Solver};
-use bentwing_trajectory::{extend_inertial, so3};
+use bentwing_trajectory::{InertialUnit, extend_inertial, so3};
 use nalgebra::{UnitQuaternion, Vector3};
 
 const SECONDS: f64 = 5.0;
@@ -88,23 +88,15 @@ fn fit(fault: &Fault, deviation: [f64; 2], random: &mut Random) -> ImuFit {
     let (start, next) = (truth(0.0), truth(0.01));
     let mut trajectory =
         Trajectory::new(0.0, 0.01, vec![start.0, next.0], vec![start.1, next.1]).unwrap();
-    let unbiased = Vector3::zeros();
-    extend_inertial(
-        &mut trajectory,
-        &imu,
-        &unbiased,
-        &unbiased,
-        &GRAVITY,
-        SECONDS,
-    );
+    let unit = InertialUnit::ideal();
+    extend_inertial(&mut trajectory, &imu, &unit, &GRAVITY, SECONDS);
     let globals = Globals {
         head: bentwing_trajectory::Head {
             T_imu_base: nalgebra::Isometry3::identity(),
             latency: 0.0,
             motor: None,
         },
-        gyro_bias: unbiased,
-        accel_bias: unbiased,
+        unit,
         gravity: GRAVITY,
     };
     let spline = CorrectionSpline::covering(0.0, trajectory.end(), settings().knot_interval);

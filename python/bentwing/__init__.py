@@ -32,6 +32,7 @@ if TYPE_CHECKING:
         UsageError,
     )
     from bentwing.base.estimate import Estimate
+    from bentwing.base.inertial_unit import InertialUnit
     from bentwing.base.mount import FixedMount, MotorMount, Mount, Pose
     from bentwing.base.progress import Progress
     from bentwing.base.trajectory import Trajectory, read_tum
@@ -69,6 +70,7 @@ else:
                 "UsageError",
             ],
             "base.estimate": ["Estimate"],
+            "base.inertial_unit": ["InertialUnit"],
             "base.mount": ["FixedMount", "MotorMount", "Mount", "Pose"],
             "base.progress": ["Progress"],
             "base.trajectory": ["Trajectory", "read_tum"],
@@ -113,6 +115,7 @@ __all__ = [
     "Estimate",
     "EstimationError",
     "FixedMount",
+    "InertialUnit",
     "InputError",
     "Merged",
     "MotorMount",

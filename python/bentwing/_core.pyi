@@ -50,6 +50,8 @@ __all__ = [
 __version__: str
 
 _Vector: TypeAlias = Sequence[float] | NDArray[np.float64]
+_Matrix: TypeAlias = Sequence[_Vector] | NDArray[np.float64]
+_Rows: TypeAlias = list[list[float]]
 _Transform: TypeAlias = tuple[_Vector, _Vector]
 """Translation (3,) m and unit quaternion (4,)."""
 _Returned: TypeAlias = tuple[list[float], list[float]]
@@ -213,7 +215,7 @@ class Imu:
 
 @final
 class Globals:
-    """The slow states: latency, extrinsics, motor, biases, gravity.
+    """The slow states: latency, extrinsics, motor, inertial unit, gravity.
 
     Parameters
     ----------
@@ -221,6 +223,7 @@ class Globals:
     latency : s, lidar stamps minus IMU clock
     gyro_bias, accel_bias : (3,) rad/s and m/s², imu frame
     gravity : (3,) m/s², map frame, pointing up
+    unit : how the IMU answers beside its biases, see `unit`; default: without further errors
     motor_axis : (3,) motor frame; only for motor-turned lidars, with `T_motor_lidar`
     encoder_zero : rad, added to every encoder angle
     T_motor_lidar : pose of the lidar in the rotating motor frame
@@ -234,6 +237,7 @@ class Globals:
         gyro_bias: _Vector,
         accel_bias: _Vector,
         gravity: _Vector,
+        unit: tuple[_Matrix, _Matrix, _Matrix, _Vector, int] | None = None,
         motor_axis: _Vector | None = None,
         encoder_zero: float = 0.0,
         T_motor_lidar: _Transform | None = None,
@@ -260,6 +264,10 @@ class Globals:
         """Accelerometer bias (3,), m/s², imu frame."""
 
     @property
+    def unit(self) -> tuple[_Rows, _Rows, _Rows, list[float], int]:
+        """`gyro`, `g_sensitivity` and `accel` by rows, `reference` and `main_axis` of an `InertialUnit`."""
+
+    @property
     def gravity(self) -> NDArray[np.float64]:
         """Gravity (3,), m/s², map frame, pointing up."""
 
@@ -276,7 +284,7 @@ class Globals:
         """Rotation (4,) of the lidar in the rotating motor frame; None without a motor."""
 
     def moved_from(self, earlier: Globals) -> list[float]:
-        """Return the correction (20,) that leads from `earlier` to these."""
+        """Return the correction (44,) that leads from `earlier` to these."""
 
     def levelled(self) -> Globals:
         """Return the same states with gravity straight up."""
@@ -291,7 +299,7 @@ class Samples:
     dt : s, interval of the samples
     positions : (N, 3) float64, m, map frame, at least two
     quats_xyzw : (N, 4) float64, unit
-    responses : (K, 6, 20) float64, how the first K follow the slow states, see `responses_at`
+    responses : (K, 6, 44) float64, how the first K follow the slow states, see `responses_at`
     """
 
     def __new__(
@@ -329,10 +337,10 @@ class Samples:
         """Return these samples with those from `first` on replaced by `newer`."""
 
     def following(self, correction: Sequence[float]) -> Samples:
-        """Return these samples where a correction (20,) of the slow states moves them."""
+        """Return these samples where a correction (44,) of the slow states moves them."""
 
     def responses_at(self, samples: Sequence[int]) -> NDArray[np.float64]:
-        """How samples follow the slow states (K, 6, 20): `[δr, δt]`, rad and m, map frame, by each."""
+        """How samples follow the slow states (K, 6, 44): `[δr, δt]`, rad and m, map frame, by each."""
 
     def extended(self, imu: Imu | None, globals: Globals, until: float) -> tuple[Samples, int]:
         """Extend by the IMU, or at constant velocity without one.
@@ -462,7 +470,7 @@ class Registration:
 
     @property
     def covariance(self) -> NDArray[np.float64]:
-        """Covariance (20, 20) of the slow states; zero where frozen."""
+        """Covariance (44, 44) of the slow states; zero where frozen."""
 
     def sample_covariances(self) -> NDArray[np.float64]:
         """Compute the covariances (N, 6, 6) of the correction of each sample, rotation first.
@@ -475,7 +483,7 @@ class Registration:
 
     @property
     def offset(self) -> list[float]:
-        """Correction (20,) that leads from the prior's mean to `globals`."""
+        """Correction (44,) that leads from the prior's mean to `globals`."""
 
     @property
     def n_surfels(self) -> int:
@@ -546,9 +554,9 @@ class Piece:
     samples : trajectory to start from
     surfels : of consecutive stretches of some seconds, in order of time
     imu : its inertial samples, less the history of their biases; None for a lidar alone
-    information : (20, 20) float64 about the prior's mean of the slow states
-    offset : (20,) correction that leads from that mean to `globals`
-    frozen : (20) slow states that are not estimated
+    information : (44, 44) float64 about the prior's mean of the slow states
+    offset : (44,) correction that leads from that mean to `globals`
+    frozen : (44) slow states that are not estimated
     """
 
     def __new__(
@@ -577,7 +585,7 @@ class GlobalRegistration:
 
     @property
     def covariances(self) -> list[NDArray[np.float64]]:
-        """Covariances (20, 20) of the slow states; zero where frozen."""
+        """Covariances (44, 44) of the slow states; zero where frozen."""
 
     @property
     def iterations(self) -> list[tuple[int, int, float, float, float, float]]:
@@ -654,9 +662,9 @@ def register_window(
 
     Parameters
     ----------
-    information : (20, 20) float64 about the prior's mean of the slow states
-    offset : (20,) correction that leads from that mean to `globals`
-    frozen : (20) slow states that are not estimated
+    information : (44, 44) float64 about the prior's mean of the slow states
+    offset : (44,) correction that leads from that mean to `globals`
+    frozen : (44) slow states that are not estimated
     joined : whether the start continues a past that is final (its first three control points follow
         the slow states as `samples` do); otherwise only the first pose stays
 

@@ -18,7 +18,9 @@ from bentwing.recording import Payload
 DT, RATE_HZ, SPIN = 0.01, 200.0, 5.0  # s, Hz, rad/s
 BASE = ((0.05, 0.0, -0.03), (0.0, 0.0, 0.0, 1.0))
 UP = np.array([0.0, 0.0, 9.80665])  # m/s²
-INFORMATION = np.diag(np.repeat([1e5, 1e4, 4e4, 1e7, 6e2, 2.5e3, 1e4], [1, 3, 3, 3, 3, 2, 5]))
+INFORMATION = np.diag(
+    np.repeat([1e5, 1e4, 4e4, 1e4, 1e7, 6e2, 2.5e3, 1e4], [1, 3, 3, 5, 3, 3, 2, 24])
+)
 
 
 def make_globals(base=BASE, **changed):
@@ -144,8 +146,8 @@ def register(flight, drifted, extract):
             "imu": _core.Imu(*flight.imu),
             "globals": make_globals(),
             "information": INFORMATION,
-            "offset": [0.0] * 20,
-            "frozen": [False] * 15 + [True] * 5,
+            "offset": [0.0] * 44,
+            "frozen": [False] * 7 + [True] * 5 + [False] * 32,
             "joined": False,
             "settings": core,
         }

@@ -56,7 +56,7 @@ def valid():
         "imu": {"stamps": times, "gyro": xyz(), "accel": xyz()},
         "place": {"points": xyz(), "stamps": times, "angles": times.copy()},
         "extract_surfels": {"points": xyz(), "stamps": times, "angles": times.copy()},
-        "register_window": {"information": 1e6 * np.eye(20)},
+        "register_window": {"information": 1e6 * np.eye(44)},
     }
 
 
@@ -80,7 +80,7 @@ ARGUMENTS = [
             Argument(call, "angles", None),
         )
     ],
-    Argument("register_window", "information", 20),
+    Argument("register_window", "information", 44),
 ]
 FLOATS = [a for a in ARGUMENTS if not a.integer]
 

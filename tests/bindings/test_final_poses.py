@@ -13,12 +13,12 @@ from bentwing.odometry.continuous.final_poses import FinalPoses
 def test_poses_follow_to_where_a_window_with_the_other_calibration_puts_them(register):
     """All slow states are held where they were corrected to, and the window is solved again."""
     free = register()
-    moved = np.zeros(20)
+    moved = np.zeros(44)
     moved[[0, 4, 5, 6]] = [5e-4, 2e-3, -1e-3, 1e-3]  # latency and lever arm
     held = register(
         samples=free.samples,
         globals=free.globals,
-        information=np.eye(20) * 1e14,
+        information=np.eye(44) * 1e14,
         offset=(-moved).tolist(),
     )
     correction = held.globals.moved_from(free.globals)

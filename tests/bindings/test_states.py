@@ -51,10 +51,13 @@ def test_a_motor_is_described_wholly_or_not_at_all(states, name):
 
 
 def test_slow_states_come_back_as_they_were_given(states):
+    rows = [[1e-3 * (3 * r + c) for c in range(3)] for r in range(3)]
+    unit = (rows, [[2.0 * v for v in row] for row in rows], rows[::-1], [0.1, 0.2, 9.8], 1)
     given = states(
         ((0.1, 0.2, 0.3), UNIT),
         latency=0.002,
         gyro_bias=(1e-3, 2e-3, 3e-3),
+        unit=unit,
         encoder_zero=0.01,
         **MOTOR,
     )
@@ -62,8 +65,17 @@ def test_slow_states_come_back_as_they_were_given(states):
     assert given.base_translation.tolist() == [0.1, 0.2, 0.3]
     assert given.gyro_bias.tolist() == [1e-3, 2e-3, 3e-3]
     assert given.encoder_zero == 0.01
+    assert given.unit == unit
     assert states().encoder_zero == 0.0
     assert states().motor_lidar_translation is None
+
+
+def test_an_inertial_unit_must_be_finite_and_have_a_main_axis(states):
+    none = np.zeros((3, 3))
+    with pytest.raises(ValueError, match=r"^unit: expected finite numbers"):
+        states(unit=(none, none + NAN, none, np.zeros(3), 2))
+    with pytest.raises(ValueError, match=r"^unit: expected a main axis of 0, 1 or 2, got 3"):
+        states(unit=(none, none, none, np.zeros(3), 3))
 
 
 def test_levelled_states_keep_the_strength_of_gravity(states):
@@ -137,12 +149,12 @@ def test_settings_without_a_field_are_refused(extract):
 
 def test_information_must_be_square(register):
     for n in (19, 21):
-        with pytest.raises(ValueError, match=r"^information: expected shape \(20, 20\), got "):
-            register(surfels=[], information=np.resize(1e6 * np.eye(20), (n, 20)))
+        with pytest.raises(ValueError, match=r"^information: expected shape \(44, 44\), got "):
+            register(surfels=[], information=np.resize(1e6 * np.eye(44), (n, 44)))
 
 
 def test_every_slow_state_is_frozen_or_not(register):
-    with pytest.raises(ValueError, match="length 20"):
+    with pytest.raises(ValueError, match="length 44"):
         register(surfels=[], frozen=[True] * 19)
 
 

@@ -93,10 +93,20 @@ impl Imu {
     }
 
     /// Integrals of the samples over `[from, to]`; `None` in a gap.
+    ///
+    /// Where the axis of rotation moves, the rotation vector is not the integral of the rates: a head
+    /// that spins and is tilted would seem to tilt less. The next term is a twelfth of the product of
+    /// two integrals that follow each other.
+    ///
+    /// References: Savage 1998, Strapdown inertial navigation integration algorithm design part 1.
     pub fn increment(&self, from: f64, to: f64) -> Option<Increment> {
         let (first, last) = (self.until(from)?, self.until(to)?);
+        let turned = last.turned - first.turned;
+        let before = self.until(2.0 * from - to);
+        let coning =
+            before.map_or_else(Vector3::zeros, |b| (first.turned - b.turned).cross(&turned));
         Some(Increment {
-            turned: last.turned - first.turned,
+            turned: turned + coning / 12.0,
             pushed: last.pushed - first.pushed,
         })
     }
@@ -194,6 +204,27 @@ mod tests {
         let angle = imu.increment(0.1, 0.2047).unwrap().turned.x;
         let exact = 0.1047 + (0.2047_f64.powi(2) - 0.1_f64.powi(2));
         assert!((angle - exact).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_spinning_imu_that_is_tilted_turns_as_far_as_it_did() {
+        let rotation =
+            |t: f64| so3::exp(&(Vector3::x() * 0.3 * t)) * so3::exp(&(Vector3::z() * 6.0 * t));
+        let times = uniform(200.0, -0.0213, 1.0);
+        let rate =
+            |t: f64| so3::exp(&(Vector3::z() * -6.0 * t)) * Vector3::x() * 0.3 + Vector3::z() * 6.0;
+        let gyro = times.iter().map(|&t| rate(t)).collect();
+        let imu = Imu::new(times.clone(), gyro, vec![Vector3::zeros(); times.len()]);
+        let (mut sum, mut n) = (Vector3::zeros(), 0.0);
+        for k in 1..90 {
+            let (from, to) = (0.01 * f64::from(k), 0.01 * f64::from(k + 1));
+            let exact = so3::log(&(rotation(from).inverse() * rotation(to)));
+            // The integral of the rates misses 3e-4 of 0.3 rad/s, and trapezoids at 200 Hz a fourth of it.
+            let off = imu.increment(from, to).unwrap().turned - exact;
+            sum += rotation(0.5 * (from + to)) * off / (to - from);
+            n += 1.0;
+        }
+        assert!((sum / n).norm() < 2.5e-5, "{sum}");
     }
 
     #[test]

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bentwing.base.inertial_unit import InertialUnit
 from bentwing.base.mount import mount_from_json
 from bentwing.base.value import Value
 
@@ -36,8 +37,10 @@ class Calibration(Value):
         `extrinsic_rotation` (3,) rad and `extrinsic_translation` (3,) m of the lidar, or of the
         motor, in the IMU frame, `gyro_bias` (3,), `accel_bias` (3,), `gravity` (2,) rad, and for
         a motor `encoder_zero` (1,) rad, and of the lidar across the axis `motor_tilt` (2,) rad and
-        `motor_offset` (2,) m
+        `motor_offset` (2,) m; of the unit `gyro_scale` (3,), `gyro_misalignment` (3,) rad, `g_sensitivity`
+        (9,) rad/s per m/s², `accel_scale` (3,) and `accel_misalignment` (6,) rad
     latency_read : s, what was taken off the lidar's stamps when they were read
+    unit : how the IMU answers beside its biases
     """
 
     latency: float
@@ -47,6 +50,7 @@ class Calibration(Value):
     gravity: NDArray[np.float64]
     std: dict[str, list[float]] = field(default_factory=dict)
     latency_read: float = 0.0
+    unit: InertialUnit = field(default_factory=InertialUnit)
 
     @property
     def source_latency(self) -> float:
@@ -61,6 +65,7 @@ class Calibration(Value):
             "latency_read": self.latency_read,
             "mount": self.mount.to_json(),
             **{name: getattr(self, name).tolist() for name in _VECTORS},
+            "unit": self.unit.to_json(),
             "std": self.std,
         }
 
@@ -71,4 +76,5 @@ class Calibration(Value):
         mount = mount_from_json(described["mount"])
         latency = described.get("latency_left", described["latency"])
         read = described.get("latency_read", 0.0)
-        return cls(latency, mount, **vectors, std=described["std"], latency_read=read)
+        unit = InertialUnit.from_json(described.get("unit"))
+        return cls(latency, mount, **vectors, std=described["std"], latency_read=read, unit=unit)

@@ -3,11 +3,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bentwing import _core
+from bentwing.base.inertial_unit import InertialUnit
 from bentwing.base.mount import FixedMount, MotorMount, Mount, Pose
 
 if TYPE_CHECKING:
@@ -20,7 +22,8 @@ UNIFORM_WITHIN = 1e-4
 
 def core_globals(calibration: Calibration) -> _core.Globals:
     """Return the slow states of a calibration."""
-    mount = calibration.mount
+    mount, unit = calibration.mount, calibration.unit
+    answer = (unit.gyro, unit.g_sensitivity, unit.accel, unit.reference, unit.main_axis)
     if isinstance(mount, FixedMount):
         return _core.Globals(
             core_pose(mount.T_imu_lidar),
@@ -28,6 +31,7 @@ def core_globals(calibration: Calibration) -> _core.Globals:
             gyro_bias=calibration.gyro_bias,
             accel_bias=calibration.accel_bias,
             gravity=calibration.gravity,
+            unit=answer,
         )
     return _core.Globals(
         core_pose(mount.T_imu_motor),
@@ -35,13 +39,33 @@ def core_globals(calibration: Calibration) -> _core.Globals:
         gyro_bias=calibration.gyro_bias,
         accel_bias=calibration.accel_bias,
         gravity=calibration.gravity,
+        unit=answer,
         motor_axis=mount.axis,
         encoder_zero=mount.encoder_zero,
         T_motor_lidar=core_pose(mount.T_motor_lidar),
     )
 
 
-def refined_mount(described: Mount, slow: _core.Globals) -> Mount:
+def refined(described: Calibration, slow: _core.Globals) -> Calibration:
+    """Return a calibration with latency, mount and unit of the slow states; gravity stays."""
+    return replace(
+        described,
+        latency=slow.latency,
+        mount=_refined_mount(described.mount, slow),
+        gyro_bias=slow.gyro_bias,
+        accel_bias=slow.accel_bias,
+        unit=unit_of(slow),
+    )
+
+
+def unit_of(slow: _core.Globals) -> InertialUnit:
+    """Return how the IMU answers by the slow states."""
+    gyro, g_sensitivity, accel, reference, main_axis = slow.unit
+    matrices = np.array(gyro), np.array(g_sensitivity), np.array(accel)
+    return InertialUnit(*matrices, np.array(reference), main_axis)
+
+
+def _refined_mount(described: Mount, slow: _core.Globals) -> Mount:
     """Return the mount with the transforms of the slow states; a motor keeps its axis."""
     base = Pose(slow.base_translation, slow.base_quat_xyzw)
     translation, quat = slow.motor_lidar_translation, slow.motor_lidar_quat_xyzw

@@ -10,6 +10,7 @@ import numpy as np
 
 from bentwing.base import geometry
 from bentwing.base.calibration import STANDARD_GRAVITY
+from bentwing.base.inertial_unit import InertialUnit
 from bentwing.base.log import get_logger
 from bentwing.recording.preprocess import find_static_start
 from bentwing.recording.preprocess.static_init import level_attitude
@@ -42,6 +43,8 @@ class Start:
     quat_xyzw : (4,) attitude of the first pose, yaw zero
     rate : (3,) rad/s, of the first pose, imu frame
     gyro_bias, accel_bias : (3,) rad/s, m/s²
+    unit : an ideal one, whose reference is the force at the start and whose main axis is the one that
+        turns most in the first seconds
     hold : s, the pose stays the first one until this time
     """
 
@@ -50,13 +53,15 @@ class Start:
     rate: NDArray[np.float64]
     gyro_bias: NDArray[np.float64]
     accel_bias: NDArray[np.float64]
+    unit: InertialUnit
     hold: float
 
 
 def level_start(time: float) -> Start:
     """Return the start of a recording without IMU: the first pose is the map."""
     level = np.array([0.0, 0.0, 0.0, 1.0])
-    return Start(None, level, np.zeros(3), np.zeros(3), np.zeros(3), time)
+    nothing = np.zeros(3)
+    return Start(None, level, nothing, nothing, nothing, InertialUnit(), time)
 
 
 def find_start(imu: ImuBatch, noise: Imu) -> Start:
@@ -75,13 +80,23 @@ def find_start(imu: ImuBatch, noise: Imu) -> Start:
         first = imu.times < imu.times[0] + MOVING_MEAN
         up = imu.accel[first].mean(axis=0)
         rate = imu.gyro[imu.times < imu.times[0] + FIRST_RATE].mean(axis=0)
-        return Start(None, attitude_of(up), rate, np.zeros(3), np.zeros(3), float(imu.times[0]))
+        unit = _unit(imu, up)
+        return Start(
+            None, attitude_of(up), rate, np.zeros(3), np.zeros(3), unit, float(imu.times[0])
+        )
     _log.info("the estimate begins after a rest from %.2f to %.2f s", static.start, static.end)
     # Only the part of the bias along gravity shows at rest; the rest is in the attitude.
     force = static.accel_mean
     bias = force * (1.0 - STANDARD_GRAVITY / float(np.linalg.norm(force)))
     hold = max(static.start, static.end - LATE_HOLD)
-    return Start(static, attitude_of(force), np.zeros(3), static.gyro_bias, bias, hold)
+    unit = _unit(imu, force)
+    return Start(static, attitude_of(force), np.zeros(3), static.gyro_bias, bias, unit, hold)
+
+
+def _unit(imu: ImuBatch, force: NDArray[np.float64]) -> InertialUnit:
+    """Return an ideal unit with `force` (3,), m/s², as its reference."""
+    turning = (imu.gyro**2).mean(axis=0)
+    return InertialUnit(reference=force, main_axis=int(np.argmax(turning)))
 
 
 def attitude_of(force: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -17,7 +17,7 @@ from bentwing.base.trajectory import Trajectory
 from bentwing.odometry.continuous.core_settings import CoreSettings
 from bentwing.odometry.continuous.settings import ContinuousSettings
 from bentwing.odometry.continuous.slow_states import SlowStatePrior, named_std
-from bentwing.odometry.core_states import core_globals, refined_mount
+from bentwing.odometry.core_states import core_globals, refined
 from bentwing.odometry.window_inputs import (
     Points,
     checked_points,
@@ -133,11 +133,7 @@ def _result(
     return WindowResult(
         trajectory=Trajectory(prior.times, found.samples.positions, found.samples.quats_xyzw),
         calibration=replace(
-            start,
-            latency=found.globals.latency,
-            mount=refined_mount(start.mount, found.globals),
-            gyro_bias=found.globals.gyro_bias,
-            accel_bias=found.globals.accel_bias,
+            refined(start, found.globals),
             gravity=found.globals.gravity,
             std=named_std(known.discounted(found.covariance), known.frozen),
         ),

@@ -8,20 +8,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bentwing.base import geometry
-from bentwing.base.calibration import Calibration
+from bentwing.base.calibration import STANDARD_GRAVITY, Calibration
 from bentwing.base.mount import FixedMount
 from bentwing.report.sections import DASH, table
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
+    from bentwing.base.inertial_unit import InertialUnit
     from bentwing.base.mount import Mount, Pose
 
 DEGREES = 180 / np.pi
+_PER_G = DEGREES * STANDARD_GRAVITY
 
 
 def calibration_table(calibration: Mapping[str, Any] | None) -> str:
-    """Make the table of latency, extrinsics and biases with their standard deviations."""
+    """Make the table of latency, extrinsics, biases and inertial unit with their standard deviations."""
     if not calibration:
         return '<p class="none">Not recorded.</p>'
     found = Calibration.from_json(calibration)
@@ -33,10 +35,31 @@ def calibration_table(calibration: Mapping[str, Any] | None) -> str:
         _row("accelerometer bias, m/s²", found.accel_bias, std.get("accel_bias"), 1.0, 4),
         _row("gravity in the map, m/s²", found.gravity, None, 1.0, 4),
     ]
+    rows += _unit_rows(found.unit, std)
     if std.get("gravity"):
         rows.append(_row("direction of gravity, °", [0.0, 0.0], std["gravity"], DEGREES, 3))
     head = ("quantity", "estimate", "standard deviation")
     return table(head, rows, numbers=frozenset({1, 2}))
+
+
+def _unit_rows(unit: InertialUnit, std: Mapping[str, list[float]]) -> list[tuple[str, str, str]]:
+    """Make the rows of what the unit does wrong beside its biases, if it was estimated."""
+    off_diagonal = ~np.eye(3, dtype=bool)
+    leans = [unit.gyro[place] for place in unit.misalignments]
+    values = {
+        "gyro_scale": ("gyro scale, %", np.diag(unit.gyro), 100.0, 3),
+        "gyro_misalignment": ("gyro misalignment, °", leans, DEGREES, 3),
+        "g_sensitivity": ("g-sensitivity, °/s/g", unit.g_sensitivity.ravel(), _PER_G, 3),
+        "accel_scale": ("accelerometer scale, %", np.diag(unit.accel), 100.0, 2),
+        "accel_misalignment": (
+            "accelerometer misalignment, °", unit.accel[off_diagonal], DEGREES, 2,
+        ),
+    }  # fmt: skip
+    return [
+        _row(title, found, std[name], scale, digits)
+        for name, (title, found, scale, digits) in values.items()
+        if name in std
+    ]
 
 
 def _mount_rows(mount: Mount, std: Mapping[str, list[float]]) -> list[tuple[str, str, str]]:

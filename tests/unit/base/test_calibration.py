@@ -9,6 +9,7 @@ import pytest
 
 from bentwing.base import geometry
 from bentwing.base.calibration import Calibration
+from bentwing.base.inertial_unit import InertialUnit
 from bentwing.base.mount import FixedMount, MotorMount, Pose
 from bentwing.base.plain import plain
 
@@ -52,6 +53,15 @@ def test_a_calibration_in_the_run_json_of_an_earlier_version_is_read():
         now = calibration(mount).to_json()
         without = {k: v for k, v in now.items() if k not in {"latency_left", "latency_read"}}
         assert Calibration.from_json({**without, "mount": old}).to_json() == now
+
+
+def test_a_unit_is_read_from_json_bit_for_bit_and_one_of_an_earlier_version_is_perfect():
+    unit = InertialUnit(*np.random.default_rng(4).normal(size=(3, 3, 3)), np.arange(3.0), 1)
+    given = replace(calibration(MOTOR), unit=unit)
+    written = json.loads(json.dumps(plain(given)))
+    assert Calibration.from_json(written).unit == unit
+    del written["unit"]
+    assert Calibration.from_json(written).unit == InertialUnit()
 
 
 def test_a_zero_behind_the_motor_leaves_the_lidar_where_it_is():

@@ -7,13 +7,13 @@ import numpy as np
 
 from bentwing import _core
 from bentwing.base.trajectory import DT
+from bentwing.odometry.continuous.slow_states import N_STATES
 
 # Its own time, s: long enough for the core to see that it rests.
 _REST = 2.0
 
 STAMP = 0.5 * _REST
 """Stamp of its surfels, s."""
-_N_SLOW = 20
 _ZERO = [0.0, 0.0, 0.0]
 
 
@@ -36,7 +36,7 @@ def fixed_piece(surfels: _core.Surfels) -> _core.Piece:
         _core.Globals(
             nowhere, latency=0.0, gyro_bias=_ZERO, accel_bias=_ZERO, gravity=[0.0, 0.0, 9.8]
         ),
-        information=np.zeros((_N_SLOW, _N_SLOW)),
-        offset=[0.0] * _N_SLOW,
-        frozen=[True] * _N_SLOW,
+        information=np.zeros((N_STATES, N_STATES)),
+        offset=[0.0] * N_STATES,
+        frozen=[True] * N_STATES,
     )

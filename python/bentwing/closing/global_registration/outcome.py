@@ -14,7 +14,7 @@ from bentwing.base.trajectory import Trajectory
 from bentwing.closing.global_registration.stretches import interval_of
 from bentwing.odometry.continuous.drift import USUAL_DISPERSION, with_heading
 from bentwing.odometry.continuous.slow_states import named_std
-from bentwing.odometry.core_states import refined_mount
+from bentwing.odometry.core_states import refined
 from bentwing.odometry.segments import joined
 
 if TYPE_CHECKING:
@@ -72,11 +72,7 @@ def closed_estimate(
     slow, covariance = found.globals[own][best], found.covariances[own][best]
     frozen = np.diag(covariance) == 0.0
     calibration = replace(
-        estimate.calibration,
-        latency=slow.latency,
-        mount=refined_mount(estimate.calibration.mount, slow),
-        gyro_bias=slow.gyro_bias,
-        accel_bias=slow.accel_bias,
+        refined(estimate.calibration, slow),
         std={**estimate.calibration.std, **named_std(covariance, frozen)},
     )
     return replace(

@@ -14,6 +14,7 @@ from bentwing.base.mount import FixedMount
 from bentwing.base.run_record import read_record
 from bentwing.base.trajectory import read_tum
 from bentwing.evaluate.simulated.truth import Truth, mapped_points
+from bentwing.evaluate.simulated.unit import in_frame_of, unit_errors
 from bentwing.evaluate.trajectory import absolute_error, drift
 
 if TYPE_CHECKING:
@@ -37,8 +38,8 @@ class Score:
     map_std, map_ratio : m; and over that of the map made with the truth
     map_excluded : share of points on no surface
     latency : s
-    extrinsic_rotation, extrinsic_translation : rad, m; None with a motor
-    gyro_bias, accel_bias : rad/s, m/s², against the truth at the end
+    extrinsic_rotation, extrinsic_translation : rad, m, in the frame of the gyro; None with a motor
+    gyro_bias, accel_bias : rad/s, m/s², against the truth at the end under the force at the start
     normalized : errors of the slow states over their stated standard deviations, by axis
     """
 
@@ -75,7 +76,8 @@ def score(simulated: Path, run: Path) -> Score:
     points = mapped_points(run / "map.laz", truth.origin_ns, truth.flight)
     surface = truth.map_error(points @ R.T + t)
     found = Calibration.from_json(read_record(run)["calibration"])
-    errors = _calibration_errors(found, truth.calibration)
+    true = in_frame_of(found, truth.calibration, truth.imu_response)
+    errors = _calibration_errors(found, true)
     return Score(
         ate=whole.position.rmse,
         ate_flight=flown.position.rmse,
@@ -106,6 +108,7 @@ def _calibration_errors(found: Calibration, true: Calibration) -> dict[str, Arra
         "latency": np.array([found.source_latency - true.source_latency]),
         "gyro_bias": found.gyro_bias - true.gyro_bias,
         "accel_bias": found.accel_bias - true.accel_bias,
+        **unit_errors(found.unit, true.unit),
     }
     if isinstance(found.mount, FixedMount) and isinstance(true.mount, FixedMount):
         pose, truly = found.mount.T_imu_lidar, true.mount.T_imu_lidar

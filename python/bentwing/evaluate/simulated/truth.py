@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import laspy
 import numpy as np
@@ -54,6 +54,16 @@ class Truth:
     def calibration(self) -> Calibration:
         """Latency, mounts, and the biases at the end."""
         return true_calibration(self.folder)
+
+    @cached_property
+    def imu_response(self) -> dict[str, Any] | None:
+        """How the IMU answers, if not perfectly."""
+        path = self.folder / "truth_realism.yaml"
+        if not path.exists():
+            return None
+        drawn = yaml.safe_load(path.read_text(encoding="utf-8"))
+        response: dict[str, Any] | None = drawn.get("imu", {}).get("response")
+        return response
 
     @cached_property
     def scene(self) -> Scene:

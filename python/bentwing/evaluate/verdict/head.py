@@ -13,6 +13,7 @@ from bentwing.base.trajectory import DT
 from bentwing.evaluate.verdict.evidence import Evidence
 from bentwing.odometry.continuous.slow_states import initial_std
 from bentwing.recording.described import described_calibration
+from bentwing.recording.sections.imu import Imu
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -33,6 +34,8 @@ _STATES = {
     "extrinsic_translation": "the place of the lidar or its motor on the IMU",
     "gyro_bias": "the gyro's zero",
     "accel_bias": "the accelerometer's zero",
+    "gyro_scale": "the scale of the gyro",
+    "accel_scale": "the scale of the accelerometer",
     "encoder_zero": "the encoder's zero",
     "motor_tilt": "the direction of the lidar on the motor",
     "motor_offset": "the place of the lidar on the motor",
@@ -44,10 +47,11 @@ _AWAY = 0.1
 
 
 def judge_calibration(found: Calibration, payload: Payload) -> list[Evidence]:
-    """Compare latency, mount and biases with what the payload says, in its standard deviations."""
+    """Compare latency, mount, biases and scales with what the payload says, in its deviations."""
     # Nothing is known of biases before: a rest tells more, but the payload says nothing of them.
     stated = {} if payload.calibration is None else payload.calibration.std
     usual = initial_std(moving=True, stated=stated)
+    usual |= (payload.imu or Imu()).errors_expected
     far = {
         name: np.abs(off) / usual[name]
         for name, off in _offsets(found, described_calibration(payload)).items()
@@ -100,6 +104,8 @@ def _offsets(found: Calibration, described: Calibration) -> dict[str, Array]:
         "latency": np.array([found.latency - described.latency]),
         "gyro_bias": found.gyro_bias,
         "accel_bias": found.accel_bias,
+        "gyro_scale": np.diag(found.unit.gyro),
+        "accel_scale": np.diag(found.unit.accel),
     }
     if isinstance(found.mount, FixedMount) and isinstance(described.mount, FixedMount):
         return offsets | _of_pose(found.mount.T_imu_lidar, described.mount.T_imu_lidar)

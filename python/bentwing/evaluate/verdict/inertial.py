@@ -129,11 +129,13 @@ def _steps(part: Trajectory, estimate: Estimate, track: InertialTrack, sigmas: _
     middles, dt = 0.5 * (times[1:] + times[:-1]), np.diff(times)[:, None]
     rates, forces = track.means(times)
     gyro_bias, accel_bias = (_bias(estimate, name, middles) for name in ("gyro_bias", "accel_bias"))
-    turns = (rates - gyro_bias) * dt
+    unit = estimate.calibration.unit
+    turns = unit.rates(rates, forces, gyro_bias) * dt
     predicted = geometry.multiply(quats[:-1], geometry.exp(turns))
     turned = geometry.log(geometry.multiply(quats[1:], geometry.inverse(predicted)))
     halfway = geometry.multiply(quats[:-1], geometry.exp(0.5 * turns))
-    accelerations = geometry.rotate(halfway, forces - accel_bias) - [0.0, 0.0, STANDARD_GRAVITY]
+    accelerations = geometry.rotate(halfway, unit.forces(forces, accel_bias))
+    accelerations[:, 2] -= STANDARD_GRAVITY
     # The last step has no neighbour, and what is left behind it is none.
     starts = np.arange(0, len(times) - _SAMPLES, _SAMPLES, dtype=np.intp)
     moved = _second_differences(part.positions, accelerations, dt, starts)

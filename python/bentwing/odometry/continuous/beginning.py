@@ -113,7 +113,10 @@ def begin_pass(
 
 def _described(payload: Payload, start: Start) -> _core.Globals:
     described = described_calibration(payload)
-    return core_globals(replace(described, gyro_bias=start.gyro_bias, accel_bias=start.accel_bias))
+    known = replace(
+        described, gyro_bias=start.gyro_bias, accel_bias=start.accel_bias, unit=start.unit
+    )
+    return core_globals(known)
 
 
 def _prior(beginning: Beginning, payload: Payload, before: OdometryPass | None) -> SlowStatePrior:

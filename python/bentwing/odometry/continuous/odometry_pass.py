@@ -15,7 +15,7 @@ from bentwing.base.trajectory import DT, Trajectory
 from bentwing.base.window_record import WindowRecord
 from bentwing.odometry.continuous.drift import Drift
 from bentwing.odometry.continuous.final_poses import FinalPoses
-from bentwing.odometry.continuous.slow_states import SlowStatePrior, named_std
+from bentwing.odometry.continuous.slow_states import N_STATES, SlowStatePrior, named_std
 from bentwing.odometry.continuous.views import FixedViews
 from bentwing.odometry.start import levelling
 
@@ -76,7 +76,7 @@ class OdometryPass:
         self._finished: list[FinalPoses] = []
         self._end = samples.end
         self._drift = Drift()
-        self.covariance = np.zeros((20, 20))
+        self.covariance = np.zeros((N_STATES, N_STATES))
         self.timings = {"propagate": 0.0, "surfels": 0.0, "register": 0.0}
         self._finish()  # a rest may have been long
 

@@ -14,7 +14,7 @@ from bentwing.base.estimate import Estimate
 from bentwing.base.trajectory import DT
 from bentwing.odometry.continuous.odometry_pass import MARGIN
 from bentwing.odometry.continuous.slow_states import named_std
-from bentwing.odometry.core_states import refined_mount
+from bentwing.odometry.core_states import refined
 from bentwing.odometry.health import unseen_sentences
 from bentwing.odometry.segments import joined
 
@@ -51,11 +51,7 @@ def estimate_of(
     n_blind = sum(p.n_blind for p in passes)
     slow = last.globals
     calibration = replace(
-        described,
-        latency=slow.latency,
-        mount=refined_mount(described.mount, slow),
-        gyro_bias=slow.gyro_bias,
-        accel_bias=slow.accel_bias,
+        refined(described, slow),
         gravity=np.array([0.0, 0.0, STANDARD_GRAVITY]),
         std=named_std(last.covariance, last.prior.frozen),
     )

@@ -21,19 +21,27 @@ if TYPE_CHECKING:
 
     Stated = Mapping[str, Sequence[float]]
 
-N_STATES = 20
+N_STATES = 44
 # Order of the core's `registration::index`.
 SLICES = {
     "latency": slice(0, 1),
     "extrinsic_rotation": slice(1, 4),
     "extrinsic_translation": slice(4, 7),
-    "gyro_bias": slice(7, 10),
-    "accel_bias": slice(10, 13),
-    "gravity": slice(13, 15),
-    "encoder_zero": slice(15, 16),
-    "motor_tilt": slice(16, 18),
-    "motor_offset": slice(18, 20),
+    "encoder_zero": slice(7, 8),
+    "motor_tilt": slice(8, 10),
+    "motor_offset": slice(10, 12),
+    "gyro_bias": slice(12, 15),
+    "accel_bias": slice(15, 18),
+    "gravity": slice(18, 20),
+    "gyro_scale": slice(20, 23),
+    "gyro_misalignment": slice(23, 26),
+    "g_sensitivity": slice(26, 35),
+    "accel_scale": slice(35, 38),
+    "accel_misalignment": slice(38, 44),
 }
+UNIT_STATES = (
+    "gyro_scale", "gyro_misalignment", "g_sensitivity", "accel_scale", "accel_misalignment",
+)  # fmt: skip
 MOTOR_STATES = ("encoder_zero", "motor_tilt", "motor_offset")
 
 # Standard deviations before anything was measured: s, rad, m, rad/s, m/s², rad, rad, rad, m.
@@ -97,8 +105,11 @@ class SlowStatePrior:
         frozen: Iterable[str],
         stated: Stated = MappingProxyType({}),
     ) -> None:
+        std = initial_std(moving=moving, stated=stated) | dict.fromkeys(UNIT_STATES, 0.0)
+        if imu is not None:
+            std |= _with_unit(std, imu.errors_expected)
+        frozen = {*frozen, *(name for name in UNIT_STATES if std[name] == 0.0)}
         names = _frozen_names(frozen, has_imu=imu is not None, has_motor=has_motor)
-        std = initial_std(moving=moving, stated=stated)
         self.frozen = np.zeros(N_STATES, dtype=bool)
         self._information = np.zeros((N_STATES, N_STATES))
         self._offset = np.zeros(N_STATES)
@@ -107,17 +118,18 @@ class SlowStatePrior:
         for name, place in SLICES.items():
             index = np.arange(N_STATES)[place]
             self.frozen[place] = name in names
-            self._information[index, index] = std[name] ** -2
+            # What is known exactly is frozen: any number keeps the matrix regular.
+            self._information[index, index] = (std[name] or 1.0) ** -2
             self._walk[place] = walk.get(name, 0.0) ** 2
 
     @property
     def information(self) -> NDArray[np.float64]:
-        """(20, 20) information about the prior's mean."""
+        """(44, 44) information about the prior's mean."""
         return self._information
 
     @property
     def offset(self) -> list[float]:
-        """Correction (20,) that leads from the prior's mean to the current values."""
+        """Correction (44,) that leads from the prior's mean to the current values."""
         return self._offset.tolist()
 
     def reset(self, name: str, std: float | NDArray[np.float64]) -> None:
@@ -156,7 +168,7 @@ class SlowStatePrior:
         self._offset[:] = np.linalg.solve(self._information, before @ self._offset)
 
     def discounted(self, covariance: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the covariance (20, 20) after a window as it is if matches depend on each other."""
+        """Return the covariance (44, 44) after a window as it is if matches depend on each other."""
         active = ~self.frozen
         honest = np.zeros_like(covariance)
         if active.any():
@@ -176,8 +188,8 @@ class SlowStatePrior:
 
         Parameters
         ----------
-        covariance : (20, 20) of the slow states after the window, prior included
-        offset : (20,) correction that leads from the prior's mean to the window's estimate
+        covariance : (44, 44) of the slow states after the window, prior included
+        offset : (44,) correction that leads from the prior's mean to the window's estimate
         shift, window : s
         """
         active = ~self.frozen
@@ -199,6 +211,19 @@ class SlowStatePrior:
     ) -> NDArray[np.float64]:
         """Information of a window without that of its prior."""
         return _positive_part(np.linalg.inv(covariance[block]) - self._information[block])
+
+
+def _with_unit(std: Mapping[str, float], errors: Mapping[str, float]) -> dict[str, float]:
+    """Return the standard deviations of the states that the errors of a unit add to.
+
+    Biases are those under the force at the start, and the frame of the unit is that of its gyro.
+    """
+    force = STANDARD_GRAVITY * float(np.hypot(errors["accel_scale"], errors["accel_misalignment"]))
+    added = {
+        "accel_bias": force,
+        "extrinsic_rotation": errors["gyro_misalignment"],
+    }
+    return {**errors, **{name: float(np.hypot(std[name], more)) for name, more in added.items()}}
 
 
 def named_std(covariance: NDArray[np.float64], frozen: NDArray[np.bool_]) -> dict[str, list[float]]:

@@ -8,6 +8,7 @@ from typing import Annotated, Literal, get_args
 from pydantic import BeforeValidator, field_validator
 
 from bentwing.base.units import Unit
+from bentwing.recording.sections.imu_errors import ImuErrors, ImuKind, expected_errors
 from bentwing.recording.sections.section import ClockOffset, Positive, Section, Topic
 
 Axis = Literal["x", "-x", "y", "-y", "z", "-z"]
@@ -45,6 +46,8 @@ class Imu(Section):
     accel_noise : m/s²/√Hz, density that includes the vibration
     gyro_bias_walk : rad/s²/√Hz
     accel_bias_walk : m/s³/√Hz
+    kind : how good it is; a better one than `consumer` helps where the motion shows little
+    errors : figures of its own, where they are known
     axes : which signed axis of the samples each axis x y z of the imu frame is
     gyro_axes : the same of the gyro alone; None: as `axes`
     units : of the samples
@@ -56,10 +59,17 @@ class Imu(Section):
     accel_noise: Annotated[Positive, Unit("m/s²/√Hz")] = 8.0e-4
     gyro_bias_walk: Annotated[Positive, Unit("rad/s²/√Hz")] = 1.0e-5
     accel_bias_walk: Annotated[Positive, Unit("m/s³/√Hz")] = 1.0e-4
+    kind: ImuKind = "consumer"
+    errors: ImuErrors = ImuErrors()
     axes: Axes = AS_GIVEN
     gyro_axes: Axes | None = None
     units: ImuUnits = ImuUnits()
     clock_offset: ClockOffset = 0.0
+
+    @property
+    def errors_expected(self) -> dict[str, float]:
+        """Standard deviations of scales, misalignments and g-sensitivity, by name."""
+        return expected_errors(self.kind, self.errors)
 
     @field_validator("axes", "gyro_axes")
     @classmethod

@@ -46,7 +46,7 @@ def _unit_rows(unit: InertialUnit, std: Mapping[str, list[float]]) -> list[tuple
     """Make the rows of what the unit does wrong beside its biases, if it was estimated."""
     off_diagonal = ~np.eye(3, dtype=bool)
     leans = [unit.gyro[place] for place in unit.misalignments]
-    values = {
+    values: dict[str, tuple[str, Iterable[float], float, int]] = {
         "gyro_scale": ("gyro scale, %", np.diag(unit.gyro), 100.0, 3),
         "gyro_misalignment": ("gyro misalignment, °", leans, DEGREES, 3),
         "g_sensitivity": ("g-sensitivity, °/s/g", unit.g_sensitivity.ravel(), _PER_G, 3),

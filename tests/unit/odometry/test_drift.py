@@ -11,6 +11,7 @@ import pytest
 from bentwing.base.trajectory import Trajectory
 from bentwing.odometry.continuous import drift as module
 from bentwing.odometry.continuous.drift import Drift, inflation_of
+from bentwing.odometry.continuous.slow_states import N_STATES, SLICES
 
 SPEED = 2.0  # m/s, along x
 SIGMAS = np.array([1e-3, 1e-3, 2e-3, 0.01, 0.01, 0.02])  # rad and m, of every window
@@ -18,7 +19,7 @@ SIGMAS = np.array([1e-3, 1e-3, 2e-3, 0.01, 0.01, 0.02])  # rad and m, of every w
 
 def window(**changed):
     values = {
-        "gyro_rms": 0.9, "accel_rms": 1.0, "residual_rms": 0.3, "covariance": np.zeros((20, 20)),
+        "gyro_rms": 0.9, "accel_rms": 1.0, "residual_rms": 0.3, "covariance": np.zeros((N_STATES, N_STATES)),
         "covariance_at": lambda _: np.diag(SIGMAS**2),
         "samples": SimpleNamespace(position_at=lambda t: np.array([SPEED * t, 0.0, 0.0]), start=0.0),
     }  # fmt: skip
@@ -57,8 +58,8 @@ def test_an_error_of_heading_moves_what_comes_later_sideways():
 
 
 def test_doubt_about_gravity_lifts_the_far_end():
-    known = np.zeros((20, 20))
-    known[14, 14] = 1e-6  # rad², about y
+    known = np.zeros((N_STATES, N_STATES))
+    known[SLICES["gravity"].start + 1, SLICES["gravity"].start + 1] = 1e-6  # rad², about y
     plain, doubted = flown(4, window()), flown(4, window(covariance=known))
     added = np.diag(doubted.matrices[-1] - plain.matrices[-1])
     tilt = module.GRAVITY * 1e-6

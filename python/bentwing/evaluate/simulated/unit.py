@@ -40,7 +40,7 @@ def in_frame_of(
             np.array(response[name]) for name in ("gyro", "accel", "g_sensitivity")
         )
     reference, axis, to_force = found.unit.reference, found.unit.main_axis, np.linalg.inv(accel)
-    to_rate: Array = np.linalg.inv(gyro)
+    to_rate = np.asarray(np.linalg.inv(gyro), float)
     R = _frame_of(to_rate, axis)
     rate = R @ to_rate
     felt = rate @ sensitivity @ to_force

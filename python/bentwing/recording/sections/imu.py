@@ -8,7 +8,7 @@ from typing import Annotated, Literal, get_args
 from pydantic import BeforeValidator, field_validator
 
 from bentwing.base.units import Unit
-from bentwing.recording.sections.imu_errors import ImuErrors, ImuKind, expected_errors
+from bentwing.recording.sections.imu_errors import WARMING, ImuErrors, ImuKind, expected_errors
 from bentwing.recording.sections.section import ClockOffset, Positive, Section, Topic
 
 Axis = Literal["x", "-x", "y", "-y", "z", "-z"]
@@ -70,6 +70,11 @@ class Imu(Section):
     def errors_expected(self) -> dict[str, float]:
         """Standard deviations of scales, misalignments and g-sensitivity, by name."""
         return expected_errors(self.kind, self.errors)
+
+    @property
+    def gyro_walk_expected(self) -> float:
+        """Random walk of the gyro's bias with its change by temperature, rad/s²/√Hz."""
+        return max(self.gyro_bias_walk, WARMING[self.kind])
 
     @field_validator("axes", "gyro_axes")
     @classmethod

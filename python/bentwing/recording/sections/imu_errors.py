@@ -47,6 +47,10 @@ USUAL = MappingProxyType({
     "tactical": _of_size(5e-4, 4e-6),
 })  # fmt: skip
 
+# A gyro's bias walks at least so fast, rad/s²/√Hz: 10, 5 and 0 mdps/°C while a unit warms up by 20 °C in
+# ten minutes are a ramp that a walk must follow over some tens of seconds.
+WARMING = MappingProxyType({"consumer": 4e-5, "industrial": 2e-5, "tactical": 0.0})
+
 
 def expected_errors(kind: ImuKind, own: ImuErrors) -> dict[str, float]:
     """Return the standard deviations by name: own figures, else those of the kind."""

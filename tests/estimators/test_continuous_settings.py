@@ -14,6 +14,7 @@ from bentwing.odometry.continuous.settings import (
     RegistrationSettings,
     SurfelSettings,
 )
+from bentwing.odometry.continuous.slow_states import UNIT_STATES
 
 QUICK = {"window": 3.0, "registration": {"max_outer": 2}}
 MODELS = [ContinuousSettings, RegistrationSettings, SurfelSettings]
@@ -70,6 +71,7 @@ def test_frozen_states_stay_exactly_at_their_start(run, head):
         "gyro_bias",
         "accel_bias",
         "gravity",
+        *UNIT_STATES,
     )
     estimate = run("continuous", settings=ContinuousSettings(**QUICK, frozen=names))
     mount, found = head.payload.T_imu_lidar, estimate.calibration

@@ -37,6 +37,10 @@ pub(crate) struct Piece {
 impl Piece {
     #[new]
     #[pyo3(signature = (samples, surfels, imu, globals, *, information, offset, frozen))]
+    #[allow(
+        clippy::large_types_passed_by_value,
+        reason = "taken from Python as a whole"
+    )]
     #[allow(clippy::too_many_arguments, reason = "the parts of a piece")]
     fn new(
         samples: Py<Samples>,

@@ -273,6 +273,10 @@ pub(crate) fn global_matrix(
     samples, surfels, views, imu, globals, *, information, offset, frozen, joined, settings,
     threads = 0,
 ))]
+#[allow(
+    clippy::large_types_passed_by_value,
+    reason = "taken from Python as a whole"
+)]
 #[allow(clippy::too_many_arguments, reason = "the parts of a problem")]
 pub(crate) fn register_window(
     py: Python<'_>,

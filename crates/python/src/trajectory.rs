@@ -186,6 +186,10 @@ impl Samples {
     }
 
     /// These samples where a correction (44,) of the slow states moves them.
+    #[allow(
+        clippy::large_types_passed_by_value,
+        reason = "taken from Python as a whole"
+    )]
     fn following(&self, correction: [f64; N_GLOBALS]) -> Self {
         let mut trajectory = self.0.clone();
         follow(&mut trajectory, &self.1, &correction);

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from bentwing.base import geometry
+from bentwing.base.inertial_unit import InertialUnit
 from bentwing.base.trajectory import Trajectory
 from bentwing.evaluate.verdict import Evidence, verdict_of
 from bentwing.report import write_report
@@ -143,6 +144,15 @@ def test_a_motor_mount_is_shown_with_its_three_parts():
     html = calibration_table({**RECORD["calibration"], "mount": {"encoder": encoder}, "std": std})
     for text in ("motor in IMU", "encoder zero", "0.573", "± 0.006", "lidar in motor", "± 2.0"):
         assert text in html, text
+
+
+def test_what_the_inertial_unit_does_wrong_is_shown_where_it_was_estimated():
+    unit = InertialUnit(gyro=np.diag([0.0, 0.0, 0.0123]), g_sensitivity=np.full((3, 3), 1e-4))
+    std = {"gyro_scale": [1e-3, 1e-3, 2e-4], "g_sensitivity": [1e-5] * 9}
+    html = calibration_table({**RECORD["calibration"], "unit": unit.to_json(), "std": std})
+    for text in ("gyro scale, %", "1.230", "± 0.020", "g-sensitivity, °/s/g", "0.056", "± 0.006"):
+        assert text in html, text
+    assert "accelerometer scale" not in html
 
 
 def test_the_page_is_the_same_without_a_drawing_library(tmp_path, whole_page, monkeypatch):

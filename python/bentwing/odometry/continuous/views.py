@@ -39,6 +39,8 @@ class FixedViews:
         self._pool: list[_View] = []
         self._settings = settings
         self._place: NDArray[np.float64] | None = None
+        # Where the newest view ends, s.
+        self._stop = -np.inf
 
     def add(self, view: _core.FixedView, place: NDArray[np.float64]) -> None:
         """Take a view in place of the oldest; one without surfels is passed over."""
@@ -60,19 +62,23 @@ class FixedViews:
         samples: _core.Samples,
         slow: _core.Globals,
     ) -> None:
-        """Freeze the last `view_length` seconds before the window, if it is time to."""
+        """Freeze the last `view_length` seconds before the window, if it is time to.
+
+        Views follow each other without overlap: at 15 m/s each metre would be in several of the
+        newest ones, and together they would reach back no farther than one of them.
+        """
         start = window_start - self._settings.view_length
         left = [s for t, s in surfels if t < window_start]
         if not left or self._settings.n_views == 0 or start < samples.start:
             return
         place = samples.position_at(window_start)
-        moved = (
-            self._place is None
-            or np.linalg.norm(place - self._place) >= self._settings.view_distance
+        moved = self._place is None or (
+            start >= self._stop - 1e-6
+            and np.linalg.norm(place - self._place) >= self._settings.view_distance
         )
         n_left = sum(int(((s.stamps >= start) & (s.stamps < window_start)).sum()) for s in left)
         poorest = min((len(v.surfels) for v in self._pool[-N_NEWEST:]), default=0)
         if not moved and n_left < RICHER * poorest:
             return
         self.add(_core.FixedView(left, start, window_start, samples, slow), place)
-        self._place = place
+        self._place, self._stop = place, window_start

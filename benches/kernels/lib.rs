@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 use bentwing_registration::{Globals, Settings as Registration};
 use bentwing_surfels::{Points, SurfelSet};
-use bentwing_trajectory::{Head, Imu, InertialUnit, Trajectory, so3};
+use bentwing_trajectory::{Head, Imu, InertialUnit, LidarClock, Trajectory, so3};
 pub use chain::chain;
 pub use features::Features;
 pub use window::prior;
@@ -72,7 +72,7 @@ impl Scanner {
             globals: Globals {
                 head: Head {
                     T_imu_base: self.mount() * Isometry3::identity(),
-                    latency: 0.0,
+                    clock: LidarClock::default(),
                     motor: None,
                 },
                 unit: InertialUnit::ideal(),

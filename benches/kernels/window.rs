@@ -7,13 +7,16 @@ use bentwing_registration::{
 
 use crate::Flight;
 
-/// A head without motor, whose states do not exist, and an IMU whose answer is known.
+/// A head without motor, whose states do not exist, with clocks that run alike and an IMU whose answer
+/// is known.
 pub fn prior() -> GlobalPrior {
     GlobalPrior {
         information: GlobalMatrix::from_diagonal_element(1e5),
         offset: [0.0; N_GLOBALS],
         frozen: std::array::from_fn(|g| {
-            (index::ENCODER_ZERO..index::HEAD.end).contains(&g) || g >= index::GYRO_SCALE.start
+            g == index::LATENCY_RATE
+                || (index::ENCODER_ZERO..index::HEAD.end).contains(&g)
+                || g >= index::GYRO_SCALE.start
         }),
     }
 }

@@ -241,11 +241,24 @@ class Globals:
         motor_axis: _Vector | None = None,
         encoder_zero: float = 0.0,
         T_motor_lidar: _Transform | None = None,
+        latency_rate: float = 0.0,
+        latency_epoch: float = 0.0,
     ) -> Globals: ...
     def __getnewargs_ex__(self) -> tuple[tuple[_Transform], dict[str, Any]]: ...
     @property
     def latency(self) -> float:
-        """Lidar stamps minus IMU clock, s."""
+        """Lidar stamps minus IMU clock at `latency_epoch`, s."""
+
+    @property
+    def latency_rate(self) -> float:
+        """How much faster than the IMU's clock the lidar's runs, s/s."""
+
+    @property
+    def latency_epoch(self) -> float:
+        """The stamp at which the latency is `latency`, s."""
+
+    def latency_at(self, stamp: float) -> float:
+        """Return by how much a stamp of the lidar is late, s."""
 
     @property
     def base_translation(self) -> NDArray[np.float64]:
@@ -284,7 +297,7 @@ class Globals:
         """Rotation (4,) of the lidar in the rotating motor frame; None without a motor."""
 
     def moved_from(self, earlier: Globals) -> list[float]:
-        """Return the correction (44,) that leads from `earlier` to these."""
+        """Return the correction (45,) that leads from `earlier` to these."""
 
     def levelled(self) -> Globals:
         """Return the same states with gravity straight up."""
@@ -299,7 +312,7 @@ class Samples:
     dt : s, interval of the samples
     positions : (N, 3) float64, m, map frame, at least two
     quats_xyzw : (N, 4) float64, unit
-    responses : (K, 6, 44) float64, how the first K follow the slow states, see `responses_at`
+    responses : (K, 6, 45) float64, how the first K follow the slow states, see `responses_at`
     """
 
     def __new__(
@@ -337,10 +350,10 @@ class Samples:
         """Return these samples with those from `first` on replaced by `newer`."""
 
     def following(self, correction: Sequence[float]) -> Samples:
-        """Return these samples where a correction (44,) of the slow states moves them."""
+        """Return these samples where a correction (45,) of the slow states moves them."""
 
     def responses_at(self, samples: Sequence[int]) -> NDArray[np.float64]:
-        """How samples follow the slow states (K, 6, 44): `[δr, δt]`, rad and m, map frame, by each."""
+        """How samples follow the slow states (K, 6, 45): `[δr, δt]`, rad and m, map frame, by each."""
 
     def extended(self, imu: Imu | None, globals: Globals, until: float) -> tuple[Samples, int]:
         """Extend by the IMU, or at constant velocity without one.
@@ -470,7 +483,7 @@ class Registration:
 
     @property
     def covariance(self) -> NDArray[np.float64]:
-        """Covariance (44, 44) of the slow states; zero where frozen."""
+        """Covariance (45, 45) of the slow states; zero where frozen."""
 
     def sample_covariances(self) -> NDArray[np.float64]:
         """Compute the covariances (N, 6, 6) of the correction of each sample, rotation first.
@@ -483,7 +496,7 @@ class Registration:
 
     @property
     def offset(self) -> list[float]:
-        """Correction (44,) that leads from the prior's mean to `globals`."""
+        """Correction (45,) that leads from the prior's mean to `globals`."""
 
     @property
     def n_surfels(self) -> int:
@@ -554,9 +567,9 @@ class Piece:
     samples : trajectory to start from
     surfels : of consecutive stretches of some seconds, in order of time
     imu : its inertial samples, less the history of their biases; None for a lidar alone
-    information : (44, 44) float64 about the prior's mean of the slow states
-    offset : (44,) correction that leads from that mean to `globals`
-    frozen : (44) slow states that are not estimated
+    information : (45, 45) float64 about the prior's mean of the slow states
+    offset : (45,) correction that leads from that mean to `globals`
+    frozen : (45) slow states that are not estimated
     """
 
     def __new__(
@@ -585,7 +598,7 @@ class GlobalRegistration:
 
     @property
     def covariances(self) -> list[NDArray[np.float64]]:
-        """Covariances (44, 44) of the slow states; zero where frozen."""
+        """Covariances (45, 45) of the slow states; zero where frozen."""
 
     @property
     def iterations(self) -> list[tuple[int, int, float, float, float, float]]:
@@ -662,9 +675,9 @@ def register_window(
 
     Parameters
     ----------
-    information : (44, 44) float64 about the prior's mean of the slow states
-    offset : (44,) correction that leads from that mean to `globals`
-    frozen : (44) slow states that are not estimated
+    information : (45, 45) float64 about the prior's mean of the slow states
+    offset : (45,) correction that leads from that mean to `globals`
+    frozen : (45) slow states that are not estimated
     joined : whether the start continues a past that is final (its first three control points follow
         the slow states as `samples` do); otherwise only the first pose stays
 

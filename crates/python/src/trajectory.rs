@@ -3,7 +3,7 @@
 
 use bentwing_registration::{Globals as RustGlobals, N_GLOBALS, PoseResponse, UNMOVED, follow};
 use bentwing_trajectory::{
-    Head, Imu as RustImu, InertialUnit, Motor, Trajectory, extend_constant_velocity,
+    Head, Imu as RustImu, InertialUnit, LidarClock, Motor, Trajectory, extend_constant_velocity,
     extend_inertial,
 };
 use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
@@ -185,7 +185,7 @@ impl Samples {
         Ok((Self(trajectory, self.1.clone()), n_blind))
     }
 
-    /// These samples where a correction (44,) of the slow states moves them.
+    /// These samples where a correction (45,) of the slow states moves them.
     #[allow(
         clippy::large_types_passed_by_value,
         reason = "taken from Python as a whole"
@@ -196,7 +196,7 @@ impl Samples {
         Self(trajectory, self.1.clone())
     }
 
-    /// How samples follow the slow states (K, 6, 44): derivatives of their rotations, rad, and their
+    /// How samples follow the slow states (K, 6, 45): derivatives of their rotations, rad, and their
     /// translations, m, in the map.
     fn responses_at<'py>(
         &self,
@@ -230,7 +230,7 @@ impl Samples {
     }
 }
 
-/// An array (K, 6, 44) of responses.
+/// An array (K, 6, 45) of responses.
 fn response_array<'py>(
     py: Python<'py>,
     responses: &[PoseResponse],
@@ -239,7 +239,7 @@ fn response_array<'py>(
     flat.to_pyarray(py).reshape([responses.len(), 6, N_GLOBALS])
 }
 
-/// The responses in an array (K, 6, 44).
+/// The responses in an array (K, 6, 45).
 fn pose_responses(array: &PyReadonlyArray3<'_, f64>) -> PyResult<Vec<PoseResponse>> {
     let shape = array.shape();
     let flat = array.as_slice().ok().filter(|_| array.is_c_contiguous());
@@ -344,6 +344,7 @@ impl Globals {
     #[pyo3(signature = (
         T_imu_base, *, latency, gyro_bias, accel_bias, gravity, unit = None,
         motor_axis = None, encoder_zero = 0.0, T_motor_lidar = None,
+        latency_rate = 0.0, latency_epoch = 0.0,
     ))]
     #[allow(clippy::too_many_arguments, reason = "the states by name")]
     fn new(
@@ -356,6 +357,8 @@ impl Globals {
         motor_axis: Option<[f64; 3]>,
         encoder_zero: f64,
         T_motor_lidar: Option<Transform>,
+        latency_rate: f64,
+        latency_epoch: f64,
     ) -> PyResult<Self> {
         let motor = match (motor_axis, T_motor_lidar) {
             (None, None) => None,
@@ -375,7 +378,11 @@ impl Globals {
         };
         let head = Head {
             T_imu_base: T_imu_base.isometry("T_imu_base")?,
-            latency: finite_number("latency", latency)?,
+            clock: LidarClock {
+                latency: finite_number("latency", latency)?,
+                rate: finite_number("latency_rate", latency_rate)?,
+                epoch: finite_number("latency_epoch", latency_epoch)?,
+            },
             motor,
         };
         let unit = unit.map_or_else(|| Ok(InertialUnit::ideal()), |unit| unit.checked())?;
@@ -397,6 +404,8 @@ impl Globals {
     ) -> PyResult<((Transform,), Bound<'py, PyDict>)> {
         let named = PyDict::new(py);
         named.set_item("latency", self.latency())?;
+        named.set_item("latency_rate", self.latency_rate())?;
+        named.set_item("latency_epoch", self.latency_epoch())?;
         named.set_item("gyro_bias", self.gyro_bias(py))?;
         named.set_item("accel_bias", self.accel_bias(py))?;
         named.set_item("gravity", self.gravity(py))?;
@@ -409,7 +418,7 @@ impl Globals {
         Ok(((Transform::of(&self.0.head.T_imu_base),), named))
     }
 
-    /// The correction (44,) that leads from `earlier` to these.
+    /// The correction (45,) that leads from `earlier` to these.
     fn moved_from(&self, earlier: &Self) -> [f64; N_GLOBALS] {
         self.0.moved_from(&earlier.0)
     }
@@ -421,10 +430,27 @@ impl Globals {
         Self(globals)
     }
 
-    /// Lidar stamps minus IMU clock, s.
+    /// Lidar stamps minus IMU clock at `latency_epoch`, s.
     #[getter]
     fn latency(&self) -> f64 {
-        self.0.head.latency
+        self.0.head.clock.latency
+    }
+
+    /// How much faster than the IMU's clock the lidar's runs, s/s.
+    #[getter]
+    fn latency_rate(&self) -> f64 {
+        self.0.head.clock.rate
+    }
+
+    /// The stamp at which the latency is `latency`, s.
+    #[getter]
+    fn latency_epoch(&self) -> f64 {
+        self.0.head.clock.epoch
+    }
+
+    /// By how much a stamp of the lidar is late, s.
+    fn latency_at(&self, stamp: f64) -> f64 {
+        self.0.head.clock.latency_at(stamp)
     }
 
     /// Translation of the lidar (or motor) in the IMU frame, m.

@@ -7,7 +7,7 @@ use bentwing_trajectory::{Head, InertialUnit, so3};
 use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
 
 /// Number of global states.
-pub const N_GLOBALS: usize = 44;
+pub const N_GLOBALS: usize = 45;
 /// A vector of all global states or their corrections.
 pub type GlobalVector = [f64; N_GLOBALS];
 /// A matrix over all global states.
@@ -18,38 +18,40 @@ pub mod index {
     use std::ops::Range;
 
     /// Those that place a surfel: rows of matches within a window concern no others.
-    pub const HEAD: Range<usize> = 0..12;
+    pub const HEAD: Range<usize> = 0..13;
     /// Those that inertial samples depend on.
-    pub const INERTIAL: Range<usize> = 12..44;
+    pub const INERTIAL: Range<usize> = 13..45;
 
-    /// Lidar stamps minus IMU clock, s.
+    /// Lidar stamps minus IMU clock at the epoch of the lidar's clock, s.
     pub const LATENCY: usize = 0;
+    /// How much faster than the IMU's clock the lidar's runs, s/s.
+    pub const LATENCY_RATE: usize = 1;
     /// `R_imu_base ← Exp(θ) R_imu_base`, rad, imu frame.
-    pub const EXTRINSIC_ROTATION: Range<usize> = 1..4;
+    pub const EXTRINSIC_ROTATION: Range<usize> = 2..5;
     /// Translation of `T_imu_base`, m, imu frame.
-    pub const EXTRINSIC_TRANSLATION: Range<usize> = 4..7;
+    pub const EXTRINSIC_TRANSLATION: Range<usize> = 5..8;
     /// Added to every encoder angle, rad.
-    pub const ENCODER_ZERO: usize = 7;
+    pub const ENCODER_ZERO: usize = 8;
     /// Rotation of the lidar about two axes perpendicular to the motor's, rad, motor frame.
-    pub const MOTOR_TILT: Range<usize> = 8..10;
+    pub const MOTOR_TILT: Range<usize> = 9..11;
     /// Translation of the lidar perpendicular to the motor's axis, m, motor frame.
-    pub const MOTOR_OFFSET: Range<usize> = 10..12;
+    pub const MOTOR_OFFSET: Range<usize> = 11..13;
     /// Gyro bias, rad/s.
-    pub const GYRO_BIAS: Range<usize> = 12..15;
+    pub const GYRO_BIAS: Range<usize> = 13..16;
     /// Accelerometer bias, m/s².
-    pub const ACCEL_BIAS: Range<usize> = 15..18;
+    pub const ACCEL_BIAS: Range<usize> = 16..19;
     /// Rotation of gravity about the x and y axes of the map, rad.
-    pub const GRAVITY: Range<usize> = 18..20;
+    pub const GRAVITY: Range<usize> = 19..21;
     /// Share of its rate that is added to each axis of the gyro.
-    pub const GYRO_SCALE: Range<usize> = 20..23;
+    pub const GYRO_SCALE: Range<usize> = 21..24;
     /// How axes of the gyro lean, rad: the pair across the main axis, and the main one to both.
-    pub const GYRO_MISALIGNMENT: Range<usize> = 23..26;
+    pub const GYRO_MISALIGNMENT: Range<usize> = 24..27;
     /// Row by row, rad/s per m/s².
-    pub const G_SENSITIVITY: Range<usize> = 26..35;
+    pub const G_SENSITIVITY: Range<usize> = 27..36;
     /// Share of its force that is added to each axis of the accelerometer.
-    pub const ACCEL_SCALE: Range<usize> = 35..38;
+    pub const ACCEL_SCALE: Range<usize> = 36..39;
     /// How axes of the accelerometer lean, rad: to y and z of x, x and z of y, x and y of z.
-    pub const ACCEL_MISALIGNMENT: Range<usize> = 38..44;
+    pub const ACCEL_MISALIGNMENT: Range<usize> = 39..45;
 }
 
 /// Places of [`index::ACCEL_MISALIGNMENT`] in the matrix.
@@ -72,7 +74,8 @@ impl Globals {
     pub fn correct(&mut self, delta: &GlobalVector) {
         let three = |r: Range<usize>| Vector3::from_column_slice(&delta[r]);
         let head = &mut self.head;
-        head.latency += delta[index::LATENCY];
+        head.clock.latency += delta[index::LATENCY];
+        head.clock.rate += delta[index::LATENCY_RATE];
         let base = &mut head.T_imu_base;
         base.rotation = so3::turned(&three(index::EXTRINSIC_ROTATION), &base.rotation);
         base.translation =
@@ -109,7 +112,9 @@ impl Globals {
             turn_about_x_and_y(&earlier.gravity, &self.gravity),
         );
         unit_moved(&self.unit, &earlier.unit, &mut delta);
-        delta[index::LATENCY] = self.head.latency - earlier.head.latency;
+        let (now, then) = (&self.head.clock, &earlier.head.clock);
+        delta[index::LATENCY] = now.latency - then.latency;
+        delta[index::LATENCY_RATE] = now.rate - then.rate;
         if let (Some(now), Some(then)) = (&self.head.motor, &earlier.head.motor) {
             delta[index::ENCODER_ZERO] = now.zero - then.zero;
             let (a, b) = (&now.T_motor_lidar, &then.T_motor_lidar);

@@ -36,6 +36,8 @@ pub struct PlacedSurfel {
     pub lever: Vector3<f64>,
     /// Velocity of the mean as a point fixed to the IMU, m/s, map frame.
     pub velocity: Vector3<f64>,
+    /// Its stamp since the epoch of the lidar's clock, s.
+    pub clock_age: f64,
     /// Encoder angle, rad.
     pub angle: f64,
     /// Mean in the lidar frame, m.
@@ -112,7 +114,8 @@ pub fn place(
     trajectory: &Trajectory,
     globals: &Globals,
 ) -> PlacedSurfel {
-    let time = set.stamps[i] - globals.head.latency;
+    let clock = &globals.head.clock;
+    let time = clock.measured(set.stamps[i]);
     let pose = trajectory.pose(time);
     let (v, omega) = trajectory.velocity(time);
     let (R_imu_lidar, t_imu_lidar) = globals.head.lidar_in_imu(set.angles[i]);
@@ -130,6 +133,7 @@ pub fn place(
         R_map_imu: pose.R,
         lever,
         velocity: v + omega.cross(&lever),
+        clock_age: set.stamps[i] - clock.epoch,
         angle: set.angles[i],
         mean_lidar: set.means[i],
     }

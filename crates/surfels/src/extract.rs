@@ -269,7 +269,7 @@ fn push_surfel(
         return false;
     }
     let (stamp, angle) = (passage.mean_time(), passage.mean_angle());
-    let pose = trajectory.pose(stamp - head.latency);
+    let pose = trajectory.pose(head.clock.measured(stamp));
     let (R_imu_lidar, t_imu_lidar) = head.lidar_in_imu(angle);
     let R_lidar_map = (pose.R * R_imu_lidar).transpose();
     let t_map_lidar = pose.p + pose.R * t_imu_lidar;

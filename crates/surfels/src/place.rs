@@ -124,8 +124,11 @@ impl WithSimd for Chunk<'_> {
     /// Places points run by run; all points of a run are between the same two samples.
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        let (trajectory, latency) = (self.placer.trajectory, self.placer.head.latency);
-        let located = self.times.iter().map(|t| trajectory.locate(t - latency));
+        let (trajectory, clock) = (self.placer.trajectory, self.placer.head.clock);
+        let located = self
+            .times
+            .iter()
+            .map(|&t| trajectory.locate(clock.measured(t)));
         let (samples, fractions): (Vec<usize>, Vec<f64>) = located.unzip();
         let mut start = 0;
         for run in samples.chunk_by(|a, b| a == b) {
@@ -142,7 +145,7 @@ impl WithSimd for Chunk<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bentwing_trajectory::Motor;
+    use bentwing_trajectory::{LidarClock, Motor};
     use nalgebra::Isometry3;
 
     #[test]
@@ -164,7 +167,7 @@ mod tests {
         for motor in [None, Some(motor)] {
             let head = Head {
                 T_imu_base: base,
-                latency: 0.003,
+                clock: LidarClock::late_by(0.003),
                 motor,
             };
             let p = [3.0, 20.0, -4.0];

@@ -16,13 +16,44 @@ pub struct Motor {
     pub T_motor_lidar: Isometry3<f64>,
 }
 
+/// The lidar's clock: what is stamped t was measured at `t - latency - rate · (t - epoch)`.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct LidarClock {
+    /// Lidar stamps minus IMU clock at the epoch, s.
+    pub latency: f64,
+    /// How much faster than the IMU's it runs, s/s.
+    pub rate: f64,
+    /// The stamp at which the latency is `latency`, s.
+    pub epoch: f64,
+}
+
+impl LidarClock {
+    /// A clock that runs as fast as the IMU's.
+    pub fn late_by(latency: f64) -> Self {
+        Self {
+            latency,
+            ..Self::default()
+        }
+    }
+
+    /// By how much a stamp is late, s.
+    pub fn latency_at(&self, stamp: f64) -> f64 {
+        self.latency + self.rate * (stamp - self.epoch)
+    }
+
+    /// When on the clock of the IMU it was that something is stamped so, s.
+    pub fn measured(&self, stamp: f64) -> f64 {
+        stamp - self.latency_at(stamp)
+    }
+}
+
 /// Sensor head: lidar, IMU and, where there is one, the motor between them.
 #[derive(Clone, Copy, Debug)]
 pub struct Head {
     /// `T_imu_lidar`, or `T_imu_motor` for a motor-turned lidar.
     pub T_imu_base: Isometry3<f64>,
-    /// Lidar stamps minus IMU clock, s: what is stamped t was measured at `t - latency`.
-    pub latency: f64,
+    /// How the lidar's stamps lead to times on the clock of the IMU.
+    pub clock: LidarClock,
     /// The motor, if the lidar is turned by one.
     pub motor: Option<Motor>,
 }
@@ -61,10 +92,21 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_fast_clock_is_later_and_later() {
+        let clock = LidarClock {
+            latency: 0.002,
+            rate: 1e-4,
+            epoch: 10.0,
+        };
+        assert!((clock.measured(10.0) - 9.998).abs() < 1e-12);
+        assert!((clock.measured(30.0) - 29.996).abs() < 1e-12);
+    }
+
+    #[test]
     fn a_motor_head_follows_the_chain_of_frames() {
         let head = Head {
             T_imu_base: Isometry3::translation(0.0, 0.0, 1.0),
-            latency: 0.0,
+            clock: LidarClock::default(),
             motor: Some(Motor {
                 axis: Vector3::z(),
                 zero: 0.25,

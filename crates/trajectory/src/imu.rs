@@ -8,6 +8,9 @@ use crate::{Trajectory, so3};
 /// Samples further apart than this, s, are a gap: nothing is said about the time between them.
 const MAX_GAP: f64 = 0.05;
 
+/// Across a gap of at most this, s, the motion is guessed better by both its ends than by the first.
+const MAX_BRIDGE: f64 = 0.25;
+
 /// Inertial samples in time order, with the running integral of the gyro.
 #[derive(Clone, Debug)]
 pub struct Imu {
@@ -51,6 +54,34 @@ impl Imu {
             turned,
             pushed,
         }
+    }
+
+    /// The same with samples on straight lines across short gaps, for a first guess of the motion.
+    #[must_use]
+    pub fn bridged(&self) -> Self {
+        let (mut times, mut gyro, mut accel) = (Vec::new(), Vec::new(), Vec::new());
+        for k in 0..self.len() {
+            let gap = if k > 0 {
+                self.times[k] - self.times[k - 1]
+            } else {
+                0.0
+            };
+            let n = if gap > MAX_GAP && gap <= MAX_BRIDGE {
+                (gap / MAX_GAP).ceil() as usize
+            } else {
+                1
+            };
+            for i in 1..n {
+                let u = i as f64 / n as f64;
+                times.push(self.times[k - 1] + gap * u);
+                gyro.push(self.gyro[k - 1].lerp(&self.gyro[k], u));
+                accel.push(self.accel[k - 1].lerp(&self.accel[k], u));
+            }
+            times.push(self.times[k]);
+            gyro.push(self.gyro[k]);
+            accel.push(self.accel[k]);
+        }
+        Self::new(times, gyro, accel)
     }
 
     /// Number of samples.

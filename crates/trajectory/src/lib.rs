@@ -12,7 +12,7 @@ pub mod so3;
 mod unit;
 
 pub use correction_spline::{Basis, CorrectionSpline, StencilWeights};
-pub use head::{Head, Motor};
+pub use head::{Head, LidarClock, Motor};
 pub use imu::{Imu, Increment, NodeForce};
 pub use propagation::{extend_constant_velocity, extend_inertial};
 pub use samples::{Pose, Trajectory, TrajectoryError};

@@ -69,7 +69,7 @@ def project(
             points = samples.place(batch.points, batch.times, angles, slow, threads=threads or 0)
             yield MapChunk(
                 points,
-                batch.times - calibration.latency,
+                calibration.measured(batch.times),
                 ranges,
                 batch.intensity,
                 batch.ring,
@@ -95,7 +95,7 @@ def _placeable(
     counts: dict[str, int],
 ) -> LidarBatch:
     """Leave out, and count, what the trajectory does not cover or is not finite."""
-    times = batch.times - calibration.latency
+    times = calibration.measured(batch.times)
     covered = trajectory.covers(times)
     if segments:
         inside = [(times >= first) & (times <= last) for first, last in segments]

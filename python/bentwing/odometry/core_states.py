@@ -23,23 +23,16 @@ UNIFORM_WITHIN = 1e-4
 def core_globals(calibration: Calibration) -> _core.Globals:
     """Return the slow states of a calibration."""
     mount, unit = calibration.mount, calibration.unit
-    answer = (unit.gyro, unit.g_sensitivity, unit.accel, unit.reference, unit.main_axis)
+    names = (
+        "latency", "latency_rate", "latency_epoch", "gyro_bias", "accel_bias", "gravity",
+    )  # fmt: skip
+    slow = {name: getattr(calibration, name) for name in names}
+    slow["unit"] = (unit.gyro, unit.g_sensitivity, unit.accel, unit.reference, unit.main_axis)
     if isinstance(mount, FixedMount):
-        return _core.Globals(
-            core_pose(mount.T_imu_lidar),
-            latency=calibration.latency,
-            gyro_bias=calibration.gyro_bias,
-            accel_bias=calibration.accel_bias,
-            gravity=calibration.gravity,
-            unit=answer,
-        )
+        return _core.Globals(core_pose(mount.T_imu_lidar), **slow)
     return _core.Globals(
         core_pose(mount.T_imu_motor),
-        latency=calibration.latency,
-        gyro_bias=calibration.gyro_bias,
-        accel_bias=calibration.accel_bias,
-        gravity=calibration.gravity,
-        unit=answer,
+        **slow,
         motor_axis=mount.axis,
         encoder_zero=mount.encoder_zero,
         T_motor_lidar=core_pose(mount.T_motor_lidar),
@@ -47,10 +40,12 @@ def core_globals(calibration: Calibration) -> _core.Globals:
 
 
 def refined(described: Calibration, slow: _core.Globals) -> Calibration:
-    """Return a calibration with latency, mount and unit of the slow states; gravity stays."""
+    """Return a calibration with clock, mount and unit of the slow states; gravity stays."""
     return replace(
         described,
         latency=slow.latency,
+        latency_rate=slow.latency_rate,
+        latency_epoch=slow.latency_epoch,
         mount=_refined_mount(described.mount, slow),
         gyro_bias=slow.gyro_bias,
         accel_bias=slow.accel_bias,

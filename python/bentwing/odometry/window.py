@@ -104,7 +104,7 @@ def register_window(
         None if imu is None else head.imu,
         has_motor=head.encoder is not None,
         moving=True,
-        frozen=chosen.frozen,
+        frozen=(*chosen.frozen, "latency_rate"),  # a window alone does not show it
     )
     found = _core.register_window(
         samples,

@@ -67,6 +67,14 @@ class LidarStream:
         )
         self._merger = SweepMerger(self.counts)
 
+    def foresee(self, recorder_ns: int, raw: bytes) -> int | None:
+        """Take a message that `decode` will get later."""
+        try:
+            header_ns, span = self._decoder.stamp_and_span(raw)
+        except wire.BrokenMessageError:
+            return 0
+        return self.monitor.foresee(header_ns, recorder_ns, raw, span)
+
     def decode(self, messages: Sequence[RawMessage]) -> LidarBatch | None:
         """Return the points of the next messages, as far as they are complete."""
         batches = [self._reading.batch(batch) for batch in self._batches(messages)]

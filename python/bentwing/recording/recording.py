@@ -12,6 +12,7 @@ from bentwing.base.clock import NS_PER_S, Clock
 from bentwing.base.errors import PayloadError, RecordingError
 from bentwing.base.log import get_logger
 from bentwing.recording import imu_units, problems
+from bentwing.recording.clocks.look_ahead import look_ahead
 from bentwing.recording.containers.source import open_source
 from bentwing.recording.fixes import Fixes, read_fixes
 from bentwing.recording.joints import peek_joints, unclear_joint
@@ -165,7 +166,7 @@ class Recording:
             return iter(())
         streams = {self._peeks[role].topic.name: self._open_streams([role])[role]}
         messages = self._source.messages(streams)
-        return group_into_slots(messages, streams)
+        return group_into_slots(look_ahead(messages, streams), streams)
 
     def __enter__(self) -> Self:
         return self
@@ -309,7 +310,8 @@ class Recording:
         by_topic = {self._peeks[role].topic.name: stream for role, stream in streams.items()}
         messages = self._source.messages(set(by_topic), self._seek_ns(begin))
         n_points = 0
-        for batch in group_into_slots(messages, by_topic, self._stop_ns(end)):
+        foreseen = look_ahead(messages, by_topic)
+        for batch in group_into_slots(foreseen, by_topic, self._stop_ns(end)):
             if (part := trimmed(batch, begin, end)) is not None:
                 n_points += hasattr(part, "points")
                 yield part

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""Decide message by message which stamp counts: header or recorder, and whether it may be used."""
+"""Decide message by message which stamp counts: header, recorder or the clock of them all."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
 from bentwing.base.errors import RecordingError
+from bentwing.recording.clocks.steady import SteadyClock
 
 if TYPE_CHECKING:
     from collections import Counter
@@ -14,6 +15,7 @@ NS_PER_S = 1_000_000_000
 MAX_OFFSET_STEP_NS = 10 * NS_PER_S  # header against recorder; less is transport delay
 MAX_UNCONFIRMED_NS = NS_PER_S  # a larger step ahead of the recorder has to be confirmed
 MAX_JUMPS = 50  # consecutive messages; more is a clock that was set, not a damaged stamp
+AFTER_SEQUENCE = 4  # bytes, after which repeated messages are the same
 MIN_GAP_NS = NS_PER_S // 2
 GAP_PERIODS = 5
 
@@ -26,7 +28,10 @@ class Gap(NamedTuple):
 
 
 class StampMonitor:
-    """Stamps of one stream, made increasing.
+    """Stamps of one stream, put where its clock says and made increasing.
+
+    A clock needs to know what comes later: call `foresee` with all messages before `accept`, or with
+    none, then every stamp stands for itself.
 
     Parameters
     ----------
@@ -48,10 +53,40 @@ class StampMonitor:
         self._n_jumps = 0
         self._period_ns = 0.0
         self._suspect: tuple[int, int] | None = None
+        self.clock = SteadyClock()
+        self._foreseen_offset_ns: int | None = None
+        self._newest = (0, b"")
+
+    def foresee(
+        self, header_ns: int, recorder_ns: int, raw: bytes, span: float | None = None
+    ) -> int | None:
+        """Take the stamps of a message that `accept` will be asked for later.
+
+        Parameters
+        ----------
+        span : s, from the first to the last point of a sweep, where these have times of their own
+
+        Returns
+        -------
+        int or None
+            How many of the messages that wait for `accept` it comes before; None for a message to drop,
+            which repeats the one before.
+        """
+        stamp_ns = self._raw_ns(header_ns, recorder_ns)
+        # Two messages may well have one stamp, where stamps have a step and a late one held others up.
+        before, self._newest = self._newest, (stamp_ns, raw[AFTER_SEQUENCE:])
+        if before == self._newest:
+            self._counts["duplicate_stamps"] += 1
+            return None
+        offset_ns = stamp_ns - recorder_ns
+        before_ns, self._foreseen_offset_ns = self._foreseen_offset_ns, offset_ns
+        if before_ns is not None and abs(offset_ns - before_ns) > MAX_UNCONFIRMED_NS:
+            return 0
+        return self.clock.foresee(stamp_ns, span)
 
     def accept(self, header_ns: int, recorder_ns: int) -> int | None:
         """Return the stamp to use in ns, or None for a message to drop."""
-        stamp_ns = (recorder_ns if self._use_recorder_time else header_ns) + self._offset_ns
+        stamp_ns = self.clock.steadied(self._raw_ns(header_ns, recorder_ns))
         offset_ns = stamp_ns - recorder_ns
         if self._last_ns is None:
             self._take(stamp_ns, offset_ns)
@@ -71,6 +106,9 @@ class StampMonitor:
         self._note_gap(step_ns)
         self._take(stamp_ns, offset_ns)
         return stamp_ns
+
+    def _raw_ns(self, header_ns: int, recorder_ns: int) -> int:
+        return (recorder_ns if self._use_recorder_time else header_ns) + self._offset_ns
 
     def _take(self, stamp_ns: int, offset_ns: int) -> None:
         self._last_ns, self._last_offset_ns, self._n_jumps = stamp_ns, offset_ns, 0

@@ -32,6 +32,13 @@ class Stream(Protocol):
     counts: Counter[str]
     monitor: StampMonitor
 
+    def foresee(self, recorder_ns: int, raw: bytes) -> int | None:
+        """Take a message that `decode` will get later, for the clock of the stream.
+
+        Returns how many of the messages that wait for `decode` it comes before; None if `decode` need
+        not get it.
+        """
+
     def decode(self, messages: Sequence[RawMessage]) -> Batch | None:
         """Return the batch of the next messages, if anything of them can be handed out yet."""
 
@@ -59,6 +66,13 @@ class ImuStream:
             offset_ns=reading.offset_ns,
         )
         self._clock, self._reading, self._cdr = clock, reading, cdr
+
+    def foresee(self, recorder_ns: int, raw: bytes) -> int | None:
+        """Take a message that `decode` will get later."""
+        try:
+            return self.monitor.foresee(wire.stamp_ns(raw, cdr=self._cdr), recorder_ns, raw)
+        except wire.BrokenMessageError:
+            return 0
 
     def decode(self, messages: Sequence[RawMessage]) -> ImuBatch | None:
         """Return the samples of the next messages."""
@@ -121,6 +135,16 @@ class EncoderStream:
         )
         self._clock, self._reading, self._cdr = clock, reading, cdr
         self._last_angle: float | None = None
+
+    def foresee(self, recorder_ns: int, raw: bytes) -> int | None:
+        """Take a message that `decode` will get later."""
+        try:
+            header_ns, joints = wire.joints(raw, cdr=self._cdr)
+        except wire.BrokenMessageError:
+            return 0
+        if joints.position(self._reading.joint) is None:
+            return 0
+        return self.monitor.foresee(header_ns, recorder_ns, raw)
 
     def decode(self, messages: Sequence[RawMessage]) -> EncoderBatch | None:
         """Return the angles of the next messages."""

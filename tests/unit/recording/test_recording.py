@@ -182,7 +182,7 @@ def test_header_stamps_that_are_all_zero_give_way_to_the_recorders(tmp_path, ros
 
 
 def test_stamps_going_backwards_are_dropped_and_told(tmp_path, ros1):
-    stamps = [0.0, 0.1, 0.2, 0.15, 0.2, 0.3]
+    stamps = [0.0, 0.1, 0.2, 0.1, 0.2, 0.3]
     entries = [("/scan", i / 10, ros1.scan(stamp)) for i, stamp in enumerate(stamps)]
     (lidar, _, _), recording = read(ros1.write(tmp_path / "a.bag", entries), NO_IMU)
     assert len(joined(lidar, "times")) == 400

@@ -86,7 +86,9 @@ pub fn add_globals(
     let n_imu = surfel.R_map_imu.tr_mul(n);
     let turned = surfel.R_map_imu.tr_mul(&surfel.lever) - head.T_imu_base.translation.vector;
     // The surfel is looked up at stamp − latency: a larger latency moves it back along its path.
-    globals[index::LATENCY] -= sign * n.dot(&surfel.velocity);
+    let passed = sign * n.dot(&surfel.velocity);
+    globals[index::LATENCY] -= passed;
+    globals[index::LATENCY_RATE] -= passed * surfel.clock_age;
     let rotation = turned.cross(&n_imu);
     for c in 0..3 {
         globals[index::EXTRINSIC_ROTATION.start + c] += sign * rotation[c];

@@ -2,7 +2,9 @@
 //! Scenes with large angles and the comparison of Jacobians with central differences.
 
 use bentwing_surfels::SurfelSet;
-use bentwing_trajectory::{CorrectionSpline, Head, InertialUnit, Motor, Trajectory, so3};
+use bentwing_trajectory::{
+    CorrectionSpline, Head, InertialUnit, LidarClock, Motor, Trajectory, so3,
+};
 use nalgebra::{Isometry3, Matrix3, Vector3};
 use proptest::prelude::*;
 use proptest::test_runner::TestCaseError;
@@ -73,7 +75,11 @@ impl Scene {
                     };
                     let head = Head {
                         T_imu_base: Isometry3::new(Vector3::new(0.1, -0.2, 0.05), extrinsic),
-                        latency: 0.002,
+                        clock: LidarClock {
+                            latency: 0.002,
+                            rate: 3e-5,
+                            epoch: 1.5,
+                        },
                         motor: Some(motor),
                     };
                     let unit = InertialUnit {

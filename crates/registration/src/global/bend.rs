@@ -122,6 +122,7 @@ mod tests {
             R_map_imu: Matrix3::identity(),
             lever: Vector3::zeros(),
             velocity: Vector3::zeros(),
+            clock_age: 0.0,
             angle: 0.0,
             mean_lidar: Vector3::zeros(),
         }

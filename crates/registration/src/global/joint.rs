@@ -13,7 +13,7 @@ use crate::{GlobalMatrix, N_GLOBALS, NormalEquations, Solution, index};
 /// Control points that the global states of a piece fill.
 pub const N_STAND_INS: usize = N_GLOBALS.div_ceil(6);
 /// The first ones, with the states that matches concern.
-pub const N_HEAD_STAND_INS: usize = index::HEAD.end / 6;
+pub const N_HEAD_STAND_INS: usize = index::HEAD.end.div_ceil(6);
 
 /// Where the unknowns of each piece stand.
 pub struct Joint {

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use bentwing_surfels::SurfelSet;
-use bentwing_trajectory::{Head, InertialUnit, Trajectory, so3};
+use bentwing_trajectory::{Head, InertialUnit, LidarClock, Trajectory, so3};
 use nalgebra::{DMatrix, Isometry3, Matrix3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
@@ -72,7 +72,7 @@ fn chunk(from: f64, to: f64, head: &Head) -> Arc<SurfelSet> {
         set.covariances
             .push(R_lidar_map * flat * R_lidar_map.transpose());
         set.normals.push(R_lidar_map * normal);
-        set.stamps.push(t + head.latency);
+        set.stamps.push(t + head.clock.latency);
         set.angles.push(0.0);
         set.n_points.push(20);
     }
@@ -84,7 +84,7 @@ fn globals() -> Globals {
     Globals {
         head: Head {
             T_imu_base: Isometry3::new(Vector3::new(0.05, 0.0, -0.1), Vector3::new(0.0, 1.5, 0.1)),
-            latency: 0.002,
+            clock: LidarClock::late_by(0.002),
             motor: None,
         },
         unit: InertialUnit::ideal(),
@@ -189,7 +189,7 @@ fn a_second_piece_with_its_own_latency_joins_the_first() -> Result<(), SolveErro
         chunks(40.0, 60.0, &second.head),
     );
     // What the registration is told is wrong by four milliseconds.
-    second.head.latency -= 0.004;
+    second.head.clock.latency -= 0.004;
     let shifted = trajectory(40.0, 60.0, |_| Vector3::new(0.08, -0.05, 0.03));
     let (held, prior_of_first) = (trajectory(0.0, 20.0, |_| Vector3::zeros()), prior());
     let problem = GlobalProblem {
@@ -212,7 +212,7 @@ fn a_second_piece_with_its_own_latency_joins_the_first() -> Result<(), SolveErro
         plan: plan(),
     };
     let found = register_globally(&problem, &of_global())?;
-    let latency = found.pieces[1].globals.head.latency;
+    let latency = found.pieces[1].globals.head.clock.latency;
     assert!((latency - 0.002).abs() < 2e-4, "latency {latency} s");
     let left = worst(
         &found.pieces[1].trajectory,

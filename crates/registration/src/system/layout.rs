@@ -49,6 +49,7 @@ impl Layout {
             i if index::GYRO_BIAS.contains(&i) => "gyro bias",
             i if index::ACCEL_BIAS.contains(&i) => "accelerometer bias",
             i if index::GRAVITY.contains(&i) => "gravity direction",
+            index::LATENCY_RATE => "rate of the lidar's clock",
             index::ENCODER_ZERO => "encoder zero",
             i if index::MOTOR_TILT.contains(&i) => "motor tilt",
             i if index::MOTOR_OFFSET.contains(&i) => "motor offset",

@@ -40,7 +40,7 @@ impl FixedView {
         globals: &Globals,
     ) -> Self {
         let voxel_sizes = set.first().map_or(Vec::new(), |s| s.voxel_sizes.clone());
-        let sample = |stamp: f64| trajectory.locate(stamp - globals.head.latency).0;
+        let sample = |stamp: f64| trajectory.locate(globals.head.clock.measured(stamp)).0;
         let (first, last) = (sample(from), sample(to));
         let mut view = Self {
             surfels: Vec::new(),

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-use bentwing_trajectory::{TrajectoryError, so3};
+use bentwing_trajectory::{LidarClock, TrajectoryError, so3};
 use nalgebra::Isometry3;
 
 use super::*;
@@ -23,7 +23,7 @@ fn settings() -> Settings {
 fn head() -> Head {
     Head {
         T_imu_base: Isometry3::new(Vector3::new(0.03, 0.0, -0.05), Vector3::new(0.0, 0.02, 0.1)),
-        latency: 0.002,
+        clock: LidarClock::late_by(0.002),
         motor: None,
     }
 }
@@ -48,7 +48,7 @@ fn wall(trajectory: &Trajectory, head: &Head) -> (Vec<[f64; 3]>, Vec<f64>) {
         let stamp = 0.1 + 0.00005 * f64::from(i);
         let (column, row) = (i / 40, i % 40);
         let target = Vector3::new(4.0, 0.05 * f64::from(column) - 2.5, 0.05 * f64::from(row));
-        let pose = trajectory.pose(stamp - head.latency);
+        let pose = trajectory.pose(head.clock.measured(stamp));
         let p = R.transpose() * (pose.R.transpose() * (target - pose.p) - t);
         out.0.push(p.into());
         out.1.push(stamp);
@@ -66,7 +66,7 @@ fn the_plane_of_a_resting_scan_is_no_surfel() -> Result<(), TrajectoryError> {
         vec![nalgebra::UnitQuaternion::identity(); 121],
     )?;
     let head = Head {
-        latency: 0.0,
+        clock: LidarClock::default(),
         ..head()
     };
     let corner = (0..600).map(|i| {
@@ -101,7 +101,7 @@ fn surfels_of_a_wall_lie_on_it_and_face_the_sensor() {
     let set = extract(points, &trajectory, &head, &settings());
     assert!((0..4).all(|l| !set.level(l).is_empty()));
     for i in 0..set.len() {
-        let pose = trajectory.pose(set.stamps[i] - head.latency);
+        let pose = trajectory.pose(head.clock.measured(set.stamps[i]));
         let (R, t) = head.lidar_in_imu(0.0);
         let mean = pose.R * (R * set.means[i] + t) + pose.p;
         let normal = pose.R * R * set.normals[i];
@@ -134,7 +134,7 @@ fn a_pause_splits_a_cell_in_two_surfels() {
     .unwrap();
     let head = Head {
         T_imu_base: Isometry3::identity(),
-        latency: 0.0,
+        clock: LidarClock::default(),
         motor: None,
     };
     let patch = |k: i32| {

@@ -104,7 +104,7 @@ class Collector:
         self._found = [Stretches(t) for t in segments]
         self._samples = [core_samples(t) for t in segments]
         self._slow = core_globals(estimate.calibration)
-        self._latency = estimate.calibration.latency
+        self._measured = estimate.calibration.measured
         self._length, self._settings, self._threads = length, settings, threads
         self._range_sigma = range_sigma
         self._number = 0
@@ -125,7 +125,7 @@ class Collector:
 
     def _cut(self, batch: LidarBatch) -> None:
         """Divide points by stretches; those outside the segments are passed over."""
-        times = batch.times - self._latency
+        times = self._measured(batch.times)
         while self._number < len(self._found):
             span = self._found[self._number].trajectory.times
             inside = (times >= span[0]) & (times <= span[-1])

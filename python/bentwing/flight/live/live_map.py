@@ -63,7 +63,7 @@ class LiveMap:
 
     def add(self, registered: Registered, buffer: BatchBuffer) -> None:
         """Place what a window has newly registered."""
-        first = registered.samples.start + registered.globals.latency
+        first = registered.samples.start + registered.globals.latency_at(registered.samples.start)
         stretch = buffer.lidar(max(self._until, first), registered.end)
         self._until = registered.end
         chosen = slice(None, None, -(-len(stretch.times) // POINTS_PER_WINDOW) or None)

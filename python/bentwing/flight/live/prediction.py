@@ -61,7 +61,7 @@ class Prediction:
 
     def __init__(self, registered: Registered) -> None:
         self.recent = registered.recent()
-        self.registered_until = registered.end - registered.globals.latency
+        self.registered_until = registered.end - registered.globals.latency_at(registered.end)
         self._slow = registered.globals.levelled()
         # With inertial samples behind all of them, so that going on from here is final.
         self._carried = _core.Samples(

@@ -85,7 +85,7 @@ def begin_pass(
     before : the pass up to the last break
     """
     start, first = beginning.start, beginning.time
-    slow = _described(payload, start) if before is None else before.globals.levelled()
+    slow = _described(payload, start, first) if before is None else before.globals.levelled()
     prior = _prior(beginning, payload, before)
     quat = start.quat_xyzw
     if start.static is not None:
@@ -111,8 +111,8 @@ def begin_pass(
     )
 
 
-def _described(payload: Payload, start: Start) -> _core.Globals:
-    described = described_calibration(payload)
+def _described(payload: Payload, start: Start, first: float) -> _core.Globals:
+    described = described_calibration(payload).with_epoch(first)
     known = replace(
         described, gyro_bias=start.gyro_bias, accel_bias=start.accel_bias, unit=start.unit
     )

@@ -15,7 +15,7 @@ from bentwing.base.trajectory import DT, Trajectory
 from bentwing.base.window_record import WindowRecord
 from bentwing.odometry.continuous.drift import Drift
 from bentwing.odometry.continuous.final_poses import FinalPoses
-from bentwing.odometry.continuous.slow_states import N_STATES, SlowStatePrior, named_std
+from bentwing.odometry.continuous.slow_states import N_STATES, SlowStatePrior, at_epoch, named_std
 from bentwing.odometry.continuous.views import FixedViews
 from bentwing.odometry.start import levelling
 
@@ -247,13 +247,16 @@ class OdometryPass:
             translation_eigenvalues=translation,
             rotation_eigenvalues=rotation,
             n_blind=result.n_blind,
-            latency=self.globals.latency,
+            latency=self.globals.latency_at(self._end),
             gyro_bias=self.globals.gyro_bias.tolist(),
             accel_bias=self.globals.accel_bias.tolist(),
             gravity=self.globals.gravity.tolist(),
             extrinsic_translation=self.globals.base_translation.tolist(),
             extrinsic_quat_xyzw=self.globals.base_quat_xyzw.tolist(),
-            std=named_std(self.covariance, self.prior.frozen),
+            std=named_std(
+                at_epoch(self.covariance, self._end - self.globals.latency_epoch),
+                self.prior.frozen,
+            ),
         )
 
     def _retire(self) -> None:

@@ -13,7 +13,7 @@ from bentwing.base.covariances import PoseCovariances
 from bentwing.base.estimate import Estimate
 from bentwing.base.trajectory import DT
 from bentwing.odometry.continuous.odometry_pass import MARGIN
-from bentwing.odometry.continuous.slow_states import named_std
+from bentwing.odometry.continuous.slow_states import at_epoch, named_std
 from bentwing.odometry.core_states import refined
 from bentwing.odometry.health import unseen_sentences
 from bentwing.odometry.segments import joined
@@ -50,13 +50,15 @@ def estimate_of(
     windows = [w for p in passes for w in p.windows]
     n_blind = sum(p.n_blind for p in passes)
     slow = last.globals
+    whole = joined(segments)
+    middle = 0.5 * float(whole.times[0] + whole.times[-1])
     calibration = replace(
         refined(described, slow),
         gravity=np.array([0.0, 0.0, STANDARD_GRAVITY]),
-        std=named_std(last.covariance, last.prior.frozen),
-    )
+        std=named_std(at_epoch(last.covariance, middle - slow.latency_epoch), last.prior.frozen),
+    ).with_epoch(middle)
     return Estimate(
-        joined(segments),
+        whole,
         calibration,
         windows=windows,
         counts={

@@ -21,30 +21,32 @@ if TYPE_CHECKING:
 
     Stated = Mapping[str, Sequence[float]]
 
-N_STATES = 44
+N_STATES = 45
 # Order of the core's `registration::index`.
 SLICES = {
     "latency": slice(0, 1),
-    "extrinsic_rotation": slice(1, 4),
-    "extrinsic_translation": slice(4, 7),
-    "encoder_zero": slice(7, 8),
-    "motor_tilt": slice(8, 10),
-    "motor_offset": slice(10, 12),
-    "gyro_bias": slice(12, 15),
-    "accel_bias": slice(15, 18),
-    "gravity": slice(18, 20),
-    "gyro_scale": slice(20, 23),
-    "gyro_misalignment": slice(23, 26),
-    "g_sensitivity": slice(26, 35),
-    "accel_scale": slice(35, 38),
-    "accel_misalignment": slice(38, 44),
+    "latency_rate": slice(1, 2),
+    "extrinsic_rotation": slice(2, 5),
+    "extrinsic_translation": slice(5, 8),
+    "encoder_zero": slice(8, 9),
+    "motor_tilt": slice(9, 11),
+    "motor_offset": slice(11, 13),
+    "gyro_bias": slice(13, 16),
+    "accel_bias": slice(16, 19),
+    "gravity": slice(19, 21),
+    "gyro_scale": slice(21, 24),
+    "gyro_misalignment": slice(24, 27),
+    "g_sensitivity": slice(27, 36),
+    "accel_scale": slice(36, 39),
+    "accel_misalignment": slice(39, 45),
 }
 UNIT_STATES = (
     "gyro_scale", "gyro_misalignment", "g_sensitivity", "accel_scale", "accel_misalignment",
 )  # fmt: skip
 MOTOR_STATES = ("encoder_zero", "motor_tilt", "motor_offset")
 
-# Standard deviations before anything was measured: s, rad, m, rad/s, m/s², rad, rad, rad, m.
+# Standard deviations before anything was measured: s, rad, m, rad/s, m/s², rad, rad, rad, m, s/s. Two
+# crystals are up to 20 ppm off each; what a computer stamps by its own clock is a little more.
 INITIAL_STD = {
     "latency": 3e-3,
     "extrinsic_rotation": 9e-3,
@@ -55,6 +57,7 @@ INITIAL_STD = {
     "encoder_zero": 9e-3,
     "motor_tilt": 9e-3,
     "motor_offset": 3e-3,
+    "latency_rate": 5e-5,
 }
 # States of which a payload may state that they are less certain.
 DESCRIBED = ("latency", "extrinsic_rotation", "extrinsic_translation")
@@ -128,12 +131,12 @@ class SlowStatePrior:
 
     @property
     def information(self) -> NDArray[np.float64]:
-        """(44, 44) information about the prior's mean."""
+        """(45, 45) information about the prior's mean."""
         return self._information
 
     @property
     def offset(self) -> list[float]:
-        """Correction (44,) that leads from the prior's mean to the current values."""
+        """Correction (45,) that leads from the prior's mean to the current values."""
         return self._offset.tolist()
 
     def reset(self, name: str, std: float | NDArray[np.float64]) -> None:
@@ -172,7 +175,7 @@ class SlowStatePrior:
         self._offset[:] = np.linalg.solve(self._information, before @ self._offset)
 
     def discounted(self, covariance: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the covariance (44, 44) after a window as it is if matches depend on each other."""
+        """Return the covariance (45, 45) after a window as it is if matches depend on each other."""
         active = ~self.frozen
         honest = np.zeros_like(covariance)
         if active.any():
@@ -192,8 +195,8 @@ class SlowStatePrior:
 
         Parameters
         ----------
-        covariance : (44, 44) of the slow states after the window, prior included
-        offset : (44,) correction that leads from the prior's mean to the window's estimate
+        covariance : (45, 45) of the slow states after the window, prior included
+        offset : (45,) correction that leads from the prior's mean to the window's estimate
         shift, window : s
         """
         active = ~self.frozen
@@ -228,6 +231,13 @@ def _with_unit(std: Mapping[str, float], errors: Mapping[str, float]) -> dict[st
         "extrinsic_rotation": errors["gyro_misalignment"],
     }
     return {**errors, **{name: float(np.hypot(std[name], more)) for name, more in added.items()}}
+
+
+def at_epoch(covariance: NDArray[np.float64], later: float) -> NDArray[np.float64]:
+    """Return the covariance (45, 45) with the latency at an epoch so much later, s."""
+    change = np.eye(N_STATES)
+    change[SLICES["latency"], SLICES["latency_rate"]] = later
+    return np.asarray(change @ covariance @ change.T)
 
 
 def named_std(covariance: NDArray[np.float64], frozen: NDArray[np.bool_]) -> dict[str, list[float]]:

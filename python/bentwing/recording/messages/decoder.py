@@ -6,6 +6,8 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, ClassVar, Generic, Protocol, TypeVar
 
+from bentwing.recording.messages import wire
+
 if TYPE_CHECKING:
     from collections import Counter
     from collections.abc import Sequence
@@ -72,6 +74,18 @@ class LidarDecoder(ABC, Generic[Message]):
         BrokenMessageError
             It cannot be read.
         """
+
+    def stamp_and_span(self, raw: bytes) -> tuple[int, float | None]:
+        """Return the stamp of a message, ns, and the time from its first to its last point, s.
+
+        The time is None where the type tells nothing that its stamps do not: all scans last as long.
+
+        Raises
+        ------
+        BrokenMessageError
+            It cannot be read.
+        """
+        return wire.stamp_ns(raw, cdr=self.cdr), None
 
     def has_point_times(self, message: Message) -> bool:  # noqa: ARG002 - most types do not vary
         """Whether a message tells when each of its points was measured."""

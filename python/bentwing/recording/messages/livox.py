@@ -40,6 +40,12 @@ class LivoxClouds(LidarDecoder[RawLivox]):
         """Return the sentence on the offsets."""
         return "time per point from offset_time (uint32): ns, relative to the time base", None
 
+    def stamp_and_span(self, raw: bytes) -> tuple[int, float | None]:
+        """Return the stamp of a message, ns, and the time from its first to its last point, s."""
+        message = livox_custom(raw, cdr=self.cdr)
+        offsets = message.points["offset_time"]
+        return message.stamp_ns, float(np.ptp(offsets)) * 1e-9 if len(offsets) else None
+
     def parse(self, raw: bytes, counts: Counter[str]) -> RawLivox:  # noqa: ARG002 - nothing is left out yet
         """Read a message."""
         return livox_custom(raw, cdr=self.cdr)

@@ -66,6 +66,16 @@ class PointClouds(LidarDecoder[Cloud]):
                 return str(reading), reading
         return None, None
 
+    def stamp_and_span(self, raw: bytes) -> tuple[int, float | None]:
+        """Return the stamp of a message, ns, and the time from its first to its last point, s."""
+        cloud = wire_clouds.point_cloud(raw, cdr=self.cdr)
+        name = time_field(cloud)
+        if name is None or self.reading is None:
+            return cloud.stamp_ns, None
+        offsets = self.reading.offsets(_native(_table(cloud).reshape(-1)[name]), cloud.stamp_ns)
+        known = offsets[np.isfinite(offsets)]
+        return cloud.stamp_ns, float(np.ptp(known)) if len(known) else None
+
     def parse(self, raw: bytes, counts: Counter[str]) -> Cloud:
         """Read a message."""
         cloud = wire_clouds.point_cloud(raw, cdr=self.cdr)

@@ -81,6 +81,10 @@ class PacketLidarStream:
         self._clock, self._decoder, self._reading = clock, decoder, reading
         self._merger = SweepMerger(self.counts)
 
+    def foresee(self, recorder_ns: int, raw: bytes) -> int | None:  # noqa: ARG002 - the sensor's own clock
+        """Take a message that `decode` will get later."""
+        return 0
+
     def decode(self, messages: Sequence[RawMessage]) -> LidarBatch | None:
         """Return the points of the next messages, as far as they are complete."""
         found = list(self._reader.packets(messages, self._decoder, leads=True))
@@ -113,6 +117,10 @@ class PacketImuStream:
         self._reader = _PacketReader(topic, packet_clock, reading.offset_ns, cdr=cdr)
         self.counts, self.monitor = self._reader.counts, self._reader.monitor
         self._clock, self._decoder, self._reading = clock, decoder, reading
+
+    def foresee(self, recorder_ns: int, raw: bytes) -> int | None:  # noqa: ARG002 - the sensor's own clock
+        """Take a message that `decode` will get later."""
+        return 0
 
     def decode(self, messages: Sequence[RawMessage]) -> ImuBatch | None:
         """Return the samples of the next messages."""

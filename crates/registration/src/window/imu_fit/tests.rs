@@ -93,7 +93,7 @@ fn fit(fault: &Fault, deviation: [f64; 2], random: &mut Random) -> ImuFit {
     let globals = Globals {
         head: bentwing_trajectory::Head {
             T_imu_base: nalgebra::Isometry3::identity(),
-            latency: 0.0,
+            clock: bentwing_trajectory::LidarClock::default(),
             motor: None,
         },
         unit,

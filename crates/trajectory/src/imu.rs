@@ -259,6 +259,29 @@ mod tests {
     }
 
     #[test]
+    fn a_short_gap_is_bridged_by_straight_lines_and_a_long_one_is_not() {
+        let rate = |t: f64| Vector3::new(1.0 + 2.0 * t, 0.0, -t);
+        let all = uniform(200.0, 0.0, 1.0);
+        let rates: Vec<_> = all.iter().map(|&t| rate(t)).collect();
+        let whole = Imu::new(all, rates.clone(), rates)
+            .increment(0.35, 0.36)
+            .unwrap();
+        for (gap, is_bridged) in [(0.2, true), (0.4, false)] {
+            let mut times = uniform(200.0, 0.0, 1.0);
+            times.retain(|&t| t <= 0.3 || t >= 0.3 + gap);
+            let gyro: Vec<_> = times.iter().map(|&t| rate(t)).collect();
+            let imu = Imu::new(times, gyro.clone(), gyro);
+            assert!(imu.increment(0.35, 0.36).is_none());
+            let said = imu.bridged().increment(0.35, 0.36);
+            assert_eq!(said.is_some(), is_bridged);
+            if let Some(said) = said {
+                assert!((said.turned - whole.turned).norm() < 1e-12);
+                assert!((said.pushed - whole.pushed).norm() < 1e-12);
+            }
+        }
+    }
+
+    #[test]
     fn nothing_is_said_across_a_gap_or_beyond_the_ends() {
         let mut times = uniform(200.0, 0.0, 1.0);
         times.retain(|&t| !(0.4..0.6).contains(&t));

@@ -63,6 +63,8 @@ def _gaps(gaps: list[tuple[float, float]]) -> str:
 def _sensors(inspection: Inspection) -> Iterator[RenderableType]:
     if inspection.point_times is not None:
         yield f"times      {escape(inspection.point_times)}"
+    for number, (role, clock) in enumerate(inspection.clocks.items()):
+        yield f"{'' if number else 'clocks':10} {escape(role)} {escape(clock)}"
     if inspection.spin is not None:
         yield from _spin(inspection.spin)
     if inspection.static_start is not None:

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from typing_extensions import Self
 
     from bentwing.recording.batches import Batch
+    from bentwing.recording.clocks.findings import ClockFindings
     from bentwing.recording.containers.scanned import TopicInfo
     from bentwing.recording.payload import PayloadLike
     from bentwing.recording.streams import Stream
@@ -244,6 +245,15 @@ class Recording:
                 if n
             }
         )
+
+    @property
+    def clocks(self) -> dict[str, ClockFindings]:
+        """What the stamps of each sensor say of its clock, as far as the latest pass got.
+
+        Sensors that stamp their packets themselves are not among them.
+        """
+        found = {role: stream.monitor.clock.findings for role, stream in self._streams.items()}
+        return {role: clock for role, clock in found.items() if clock.n}
 
     @property
     def gaps(self) -> dict[str, list[tuple[float, float]]]:

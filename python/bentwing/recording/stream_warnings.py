@@ -40,6 +40,13 @@ def stream_warnings(topic: str, stream: Stream, clock: Clock) -> list[str]:
             f"were left out, the first at {_seconds(clock, monitor.first_backwards_ns):.1f} s; check "
             "that only one driver publishes and that its clock is not set while recording"
         )
+    found = monitor.clock.findings
+    if found.is_poor:
+        sentences.append(
+            f"{topic}: the stamps jitter by {1e3 * found.jitter:.1f} ms, and {found.late_share:.1%} come "
+            f"up to {1e3 * found.latest:.0f} ms late; {found.n_corrected} of {found.n} were put where "
+            "the sensor's period says; let the driver use the sensor's own time stamps"
+        )
     gaps = [
         f"{(gap.end_ns - gap.start_ns) / 1e9:.1f} s from {_seconds(clock, gap.start_ns):.1f} s on"
         for gap in sorted(monitor.gaps, key=lambda gap: gap.start_ns - gap.end_ns)

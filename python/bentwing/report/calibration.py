@@ -30,6 +30,7 @@ def calibration_table(calibration: Mapping[str, Any] | None) -> str:
     std = found.std
     rows = [
         _row("lidar latency, ms", [found.source_latency], std.get("latency"), 1e3, 3),
+        *_rate_row(found, std.get("latency_rate")),
         *_mount_rows(found.mount, std),
         _row("gyro bias, °/s", found.gyro_bias, std.get("gyro_bias"), DEGREES, 4),
         _row("accelerometer bias, m/s²", found.accel_bias, std.get("accel_bias"), 1.0, 4),
@@ -60,6 +61,12 @@ def _unit_rows(unit: InertialUnit, std: Mapping[str, list[float]]) -> list[tuple
         for name, (title, found, scale, digits) in values.items()
         if name in std
     ]
+
+
+def _rate_row(found: Calibration, std: Sequence[float] | None) -> list[tuple[str, str, str]]:
+    if std is None:
+        return []
+    return [_row("lidar clock against the IMU's, ppm", [found.latency_rate], std, 1e6, 1)]
 
 
 def _mount_rows(mount: Mount, std: Mapping[str, list[float]]) -> list[tuple[str, str, str]]:

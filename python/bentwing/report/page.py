@@ -232,6 +232,7 @@ def _record(record: Mapping[str, Any]) -> str:
     settings, versions = record.get("settings") or {}, record.get("versions") or {}
     blocks = [
         ("Counts", sections.mapping_table(("what", "number"), record.get("counts") or {})),
+        ("Clocks", sections.mapping_table(("of", "value"), record.get("clocks") or {})),
         ("Time", sections.timings_table(record.get("timings") or {})),
         ("Settings", sections.mapping_table(("setting", "value"), settings)),
         ("Versions", sections.mapping_table(("of", "version"), versions)),

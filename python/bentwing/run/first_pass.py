@@ -119,7 +119,11 @@ class FirstPass:
         )
         return replace(
             found,
-            reading=Reading(dict(part.recording.counts + self._counts), warnings),
+            reading=Reading(
+                dict(part.recording.counts + self._counts),
+                warnings,
+                {role: clock.to_json() for role, clock in part.recording.clocks.items()},
+            ),
             spin=self._spin,
             evidence=tuple(evidence),
         )

@@ -33,10 +33,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """What the first pass over a recording has read and dropped."""
+    """What the first pass over a recording has read and dropped.
+
+    Attributes
+    ----------
+    clocks : by sensor, what its stamps say of its clock, for run.json
+    """
 
     counts: dict[str, int] = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)
+    clocks: dict[str, dict[str, Any]] = field(default_factory=dict)
 
 
 @dataclass(slots=True)
@@ -161,6 +167,7 @@ class Found:
             localization = {**localization, **written.change}
         return {
             "counts": counts,
+            "clocks": self.reading.clocks,
             "verdict": self.verdict,
             "set_up": [] if self.set_up is None else self.set_up.findings,
             "warnings": self.warnings,

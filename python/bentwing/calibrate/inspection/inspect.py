@@ -60,6 +60,7 @@ class Inspection:
     structure : what the lidar saw
     self_hits : boxes around what it saw of its own carrier, beyond those of the payload
     counts : everything read and dropped
+    clocks : by sensor, what its stamps say of its clock
     defects : what prevents mapping, each with how to repair it
     warnings : what may make the map worse
     set_up : the sensor head as the motion shows it; None where there is no IMU and no encoder
@@ -78,6 +79,7 @@ class Inspection:
     defects: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
     set_up: SetUp | None = None
+    clocks: dict[str, str] = field(default_factory=dict)
 
     @property
     def is_fit(self) -> bool:
@@ -183,6 +185,7 @@ def _inspect_recording(recording: Recording, *, has_payload: bool) -> Inspection
         dict(recording.counts),
         judgement.defects,
         recording.warnings + warnings,
+        clocks={role: str(clock) for role, clock in recording.clocks.items()},
     )
 
 

@@ -50,9 +50,11 @@ class InputOrder:
         times: ArrayLike,
         rings: ArrayLike | None = None,
         reading: LidarReading = LidarReading(),  # noqa: B008 - frozen
+        *,
+        overlaps: bool = False,
     ) -> LidarBatch:
-        """Return returns of the lidar."""
-        stamps = self._times("point", LidarBatch, times, reading.offset_ns)
+        """Return returns of the lidar; with `overlaps` they may begin before the batch before ends."""
+        stamps = self._times("point", LidarBatch, times, reading.offset_ns, overlaps=overlaps)
         table = reading.points(_table("point", "points", points, stamps))
         if rings is None:
             return LidarBatch(table, stamps)
@@ -83,10 +85,17 @@ class InputOrder:
 
     def accept(self, batch: Batch) -> None:
         """Remember a batch that was taken."""
-        self._newest[type(batch)] = float(batch.times[-1])
+        if len(batch.times):
+            self._newest[type(batch)] = float(batch.times[-1])
 
     def _times(
-        self, sensor: str, kind: type[Batch], times: ArrayLike, offset_ns: int
+        self,
+        sensor: str,
+        kind: type[Batch],
+        times: ArrayLike,
+        offset_ns: int,
+        *,
+        overlaps: bool = False,
     ) -> NDArray[np.float64]:
         # A copy: drivers fill the same buffer again.
         stamps = np.array(times, dtype=np.float64, ndmin=1)
@@ -110,7 +119,7 @@ class InputOrder:
             msg = f"{_named(sensor, stamps)}: times: row {row} goes back by {-steps[row - 1]:.6f} s; sort by time"
             raise ValueError(msg)
         newest = self._newest.get(kind, -np.inf)
-        if stamps[0] < newest:
+        if stamps[0] < newest and not overlaps:
             msg = (
                 f"{_named(sensor, stamps)}: times: begins before {newest:.6f} s, the end of the "
                 "batch before; feed each sensor in the order of its time"

@@ -16,6 +16,7 @@ from bentwing.base.errors import UsageError
 from bentwing.base.log import get_logger
 from bentwing.flight.control import StallWatch
 from bentwing.flight.live.backlog import Backlog
+from bentwing.flight.live.clocks import LiveClocks
 from bentwing.flight.live.inputs import InputOrder
 from bentwing.flight.live.live_map import LiveMap, MapUpdate
 from bentwing.flight.live.prediction import StampedPose, past_pose
@@ -49,7 +50,8 @@ class Odometry:
 
     Feed what comes, from any thread; windows are registered in a thread of the object's own, and
     `pose` never waits for it. All times are seconds since one start of your choice, near the first
-    sample: subtract it from the stamps while they are integers. Points carry the lidar's stamps,
+    sample: subtract it from the stamps while they are integers. Stamps that jitter are put where the
+    period of their sensor says, as far as that is known by then. Points carry the lidar's stamps,
     everything else the IMU's; the latency between both is estimated.
 
     Parameters
@@ -90,6 +92,7 @@ class Odometry:
         self._dropped: Counter[str] = Counter({"live.points_dropped": 0})
         self._filtered: Counter[str] = Counter()
         self._order = InputOrder()
+        self._clocks = LiveClocks()
         self._feeding = Lock()
         self._state = LiveState()
         self._engine = create(estimator, head, settings, threads)
@@ -121,10 +124,15 @@ class Odometry:
         ValueError
             If the batch cannot be used; nothing of it is taken.
         """
-        self._add_imu(times, gyro, accel, self._readings.imu)
+        self._add_imu(times, gyro, accel, self._readings.imu, self._clocks)
 
     def _add_imu(
-        self, times: ArrayLike, gyro: ArrayLike, accel: ArrayLike, reading: ImuReading
+        self,
+        times: ArrayLike,
+        gyro: ArrayLike,
+        accel: ArrayLike,
+        reading: ImuReading,
+        clocks: LiveClocks | None,
     ) -> None:
         with self._feeding:
             batch = self._order.imu(times, gyro, accel, reading)
@@ -134,10 +142,18 @@ class Odometry:
                     "describe the IMU in the payload, and feed it before the points' first six seconds"
                 )
                 raise ValueError(msg)
-            self._take(batch)
+            if clocks is None:
+                self._take(batch)
+            else:
+                self._take(clocks.imu(batch), batch)
 
     def add_points(
-        self, points: ArrayLike, times: ArrayLike, rings: ArrayLike | None = None
+        self,
+        points: ArrayLike,
+        times: ArrayLike,
+        rings: ArrayLike | None = None,
+        *,
+        stamp: float | None = None,
     ) -> None:
         """Take returns of the lidar, a scan or less.
 
@@ -146,6 +162,8 @@ class Odometry:
         points : (N, 3), m, lidar frame, or scaled and mirrored as the payload says
         times : (N,), s, lidar clock, non-decreasing, not before what was added last
         rings : (N,), beam numbers of a multi-beam lidar, for `kalman`, which is better with them
+        stamp : s, of the scan or sweep, from which the times count; with it the jitter of a periodic
+            lidar's stamps is taken off the times, which may then overlap the batch before
 
         Raises
         ------
@@ -153,7 +171,13 @@ class Odometry:
             If the batch cannot be used; nothing of it is taken.
         """
         with self._feeding:
-            self._take(self._order.points(points, times, rings, self._readings.lidar))
+            batch = self._order.points(
+                points, times, rings, self._readings.lidar, overlaps=stamp is not None
+            )
+            if stamp is None:
+                self._take(batch)
+            else:
+                self._take(self._clocks.points(batch, float(stamp)), batch)
 
     def add_encoder(self, times: ArrayLike, angles: ArrayLike) -> None:
         """Take angles of the motor that turns the lidar, one or many.
@@ -169,13 +193,14 @@ class Odometry:
             If the batch cannot be used; nothing of it is taken.
         """
         with self._feeding:
-            self._take(self._order.encoder(times, angles, self._readings.encoder))
+            batch = self._order.encoder(times, angles, self._readings.encoder)
+            self._take(self._clocks.encoder(batch), batch)
 
     def feed(self, batch: Batch) -> None:
         """Take a batch as a `Recording` streams it, to replay one."""
-        # A recording has read its samples as the payload says already.
+        # A recording has read its samples as the payload says already, and their stamps as a clock.
         if isinstance(batch, ImuBatch):
-            self._add_imu(batch.times, batch.gyro, batch.accel, ImuReading())
+            self._add_imu(batch.times, batch.gyro, batch.accel, ImuReading(), None)
             return
         with self._feeding:
             if isinstance(batch, LidarBatch):
@@ -327,7 +352,8 @@ class Odometry:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _take(self, batch: Batch) -> None:
+    def _take(self, batch: Batch, given: Batch | None = None) -> None:
+        """Take a batch, whose times may be others than those that were given."""
         if not len(batch.times):
             return
         if isinstance(batch, LidarBatch) and not self._has_time(batch):
@@ -338,7 +364,7 @@ class Odometry:
             self._dropped["live.points_dropped"] += len(batch.times)
         else:
             self._worker.put(batch)
-        self._order.accept(batch)
+        self._order.accept(batch if given is None else given)
         self._watch_spin(batch)
         if isinstance(batch, ImuBatch):
             self._state.add_imu(batch)

@@ -17,6 +17,8 @@ LATE = 4.0
 """Times the jitter; a message later than that is late."""
 NOTABLE = 5e-4
 """s; nothing is late by less."""
+POOR_JITTER, POOR_SHARE, POOR_LATENESS = 1e-3, 0.005, 0.005
+"""s, share and s. What is beyond is left of a host's load, and is said."""
 MOST_LOST = 0.5
 """s, of a silence in which messages were lost; a longer one is a gap."""
 
@@ -87,13 +89,24 @@ class ClockFindings:
         """Between the slowest and the fastest second, as a share of the period."""
         return self._longest / self._shortest - 1.0 if self.n_periodic else 0.0
 
+    @property
+    def late_share(self) -> float:
+        """Share of the messages with a clock that came late."""
+        return self.n_late / self.n_periodic if self.n_periodic else 0.0
+
+    @property
+    def is_poor(self) -> bool:
+        """Whether the user should know."""
+        is_late = self.late_share > POOR_SHARE and self.latest > POOR_LATENESS
+        return self.n_corrected > 0 and (self.jitter > POOR_JITTER or is_late)
+
     def to_json(self) -> dict[str, Any]:
         """Return them as run.json has them, times in s."""
         return {
             "period": self.period,
             "jitter": self.jitter,
             "drift_ppm": 1e6 * self.drift,
-            "late_share": self.n_late / self.n_periodic if self.n_periodic else 0.0,
+            "late_share": self.late_share,
             "latest": self.latest,
             "lost": self.n_lost,
             "periodic_share": self.n_periodic / self.n if self.n else 0.0,
@@ -103,8 +116,8 @@ class ClockFindings:
     def __str__(self) -> str:
         if self.period is None or 2 * self.n_periodic < self.n:
             return "not periodic, every stamp as it is"
-        late = self.n_late / self.n_periodic
+        most = f" (at most {1e3 * self.latest:.0f} ms)" if self.n_late else ""
         return (
-            f"every {1e3 * self.period:.4g} ms, jitter {1e3 * self.jitter:.2g} ms, {late:.1%} late "
-            f"(at most {1e3 * self.latest:.0f} ms), {self.n_lost} lost, {self.n_corrected} corrected"
+            f"every {1e3 * self.period:.4g} ms, jitter {1e3 * self.jitter:.2f} ms, "
+            f"{self.late_share:.1%} late{most}, {self.n_lost} lost, {self.n_corrected} corrected"
         )

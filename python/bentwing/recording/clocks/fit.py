@@ -74,6 +74,10 @@ class ClockLine:
         """The message after the stretch."""
         return self.first + len(self.numbers)
 
+    def time(self, number: int) -> float:
+        """Return when a message is sent, s."""
+        return self.origin + self.period * number
+
     def times(self, numbers: NDArray[np.int64]) -> Array:
         """Return when messages (K,) are sent, s."""
         return np.asarray(self.origin + self.period * numbers)
@@ -205,4 +209,4 @@ def _is_steady(residuals: Array, jitter: float) -> bool:
         if abs(float(part[kept].mean())) > max(allowed, 1e-9):
             return False
     left = np.where(usual, residuals, 0.0)
-    return bool(left[1:] @ left[:-1] <= MOST_LASTING * max(left @ left, 1e-18 * n))
+    return float(left[1:] @ left[:-1]) <= MOST_LASTING * max(float(left @ left), 1e-18 * n)

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bentwing.recording.preprocess.smooth_angles import SmoothAngles
+
 if TYPE_CHECKING:
     from collections import Counter
     from collections.abc import Iterator
@@ -37,9 +39,15 @@ class EncoderAngles:
         self._times = np.zeros(0)
         self._angles = np.zeros(0)
         self._waiting: deque[LidarBatch] = deque()
+        self._smooth = SmoothAngles()
 
     def add_encoder(self, batch: EncoderBatch) -> Iterator[LidarBatch]:
         """Take the next angles; yield the batches they complete."""
+        usable = self._smooth.add(batch)
+        if usable is not None:
+            yield from self._add(usable)
+
+    def _add(self, batch: EncoderBatch) -> Iterator[LidarBatch]:
         self._times = np.concatenate([self._times, batch.times + self._delay])
         self._angles = np.concatenate([self._angles, batch.angles])
         yield from self._release(float(self._times[-1]))
@@ -53,6 +61,8 @@ class EncoderAngles:
 
     def finish(self) -> Iterator[LidarBatch]:
         """Yield what still waits, as far as it is covered."""
+        if (rest := self._smooth.finish()) is not None:
+            yield from self._add(rest)
         yield from self._release(np.inf)
 
     def _release(self, until: float) -> Iterator[LidarBatch]:

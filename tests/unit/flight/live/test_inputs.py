@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -68,3 +70,17 @@ def test_a_replayed_batch_is_not_read_a_second_time(monkeypatch):
         odometry.add_points(np.ones((2, 3)), TIMES)
     assert taken[:3] == batches
     assert taken[3] == batches[1]
+
+
+def test_stamps_of_a_host_are_put_where_their_clocks_say(monkeypatch):
+    taken, rng = [], np.random.default_rng(3)
+    with Odometry(HEAD) as odometry:
+        monkeypatch.setattr(odometry, "_take", lambda batch, given: taken.append((batch, given)))
+        begins = np.arange(0.0, 20.0, 0.025)
+        for stamp in begins + 6e-4 * rng.gamma(4.0, 1.0, len(begins)):
+            times = stamp + np.linspace(0.0, 0.02, 5)
+            odometry.add_points(np.ones((5, 3)), times, stamp=stamp)
+    first, raw = (np.array([pair[i].times[0] for pair in taken]) for i in (0, 1))
+    known = begins > 5.0
+    assert np.std((first - begins)[known]) < 0.2 * np.std((raw - begins)[known])
+    assert all(a[0].times[-1] <= b[0].times[0] for a, b in pairwise(taken))

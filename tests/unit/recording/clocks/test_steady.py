@@ -79,7 +79,7 @@ def test_stamps_without_a_rule_stay_as_they_are():
     assert str(clock.findings) == "not periodic, every stamp as it is"
 
 
-@pytest.mark.parametrize("step", [0.004, -0.0004, 0.3])
+@pytest.mark.parametrize("step", [0.004, -0.002, 0.3])
 def test_a_step_of_the_clock_is_kept(step):
     times, stamps_ns = host_stamps(np.random.default_rng(7), 0.025, 30.0, jitter=4e-4)
     after = times > 15.0

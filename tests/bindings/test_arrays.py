@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from bentwing import _core
+from bentwing.odometry.continuous.slow_states import N_STATES
 
 N = 6
 
@@ -56,7 +57,7 @@ def valid():
         "imu": {"stamps": times, "gyro": xyz(), "accel": xyz()},
         "place": {"points": xyz(), "stamps": times, "angles": times.copy()},
         "extract_surfels": {"points": xyz(), "stamps": times, "angles": times.copy()},
-        "register_window": {"information": 1e6 * np.eye(44)},
+        "register_window": {"information": 1e6 * np.eye(N_STATES)},
     }
 
 
@@ -80,7 +81,7 @@ ARGUMENTS = [
             Argument(call, "angles", None),
         )
     ],
-    Argument("register_window", "information", 44),
+    Argument("register_window", "information", N_STATES),
 ]
 FLOATS = [a for a in ARGUMENTS if not a.integer]
 

@@ -8,17 +8,19 @@ import pytest
 
 from bentwing.base import geometry
 from bentwing.odometry.continuous.final_poses import FinalPoses
+from bentwing.odometry.continuous.slow_states import N_STATES, SLICES
 
 
 def test_poses_follow_to_where_a_window_with_the_other_calibration_puts_them(register):
     """All slow states are held where they were corrected to, and the window is solved again."""
     free = register()
-    moved = np.zeros(44)
-    moved[[0, 4, 5, 6]] = [5e-4, 2e-3, -1e-3, 1e-3]  # latency and lever arm
+    moved = np.zeros(N_STATES)
+    moved[SLICES["latency"]] = 5e-4
+    moved[SLICES["extrinsic_translation"]] = [2e-3, -1e-3, 1e-3]
     held = register(
         samples=free.samples,
         globals=free.globals,
-        information=np.eye(44) * 1e14,
+        information=np.eye(N_STATES) * 1e14,
         offset=(-moved).tolist(),
     )
     correction = held.globals.moved_from(free.globals)

@@ -6,6 +6,7 @@ import pytest
 
 from bentwing import _core
 from bentwing.odometry.continuous.settings import RegistrationSettings
+from bentwing.odometry.continuous.slow_states import N_STATES
 
 UNIT = (0.0, 0.0, 0.0, 1.0)
 HERE = ((0.0, 0.0, 0.0), UNIT)
@@ -148,14 +149,14 @@ def test_settings_without_a_field_are_refused(extract):
 
 
 def test_information_must_be_square(register):
-    for n in (19, 21):
-        with pytest.raises(ValueError, match=r"^information: expected shape \(44, 44\), got "):
-            register(surfels=[], information=np.resize(1e6 * np.eye(44), (n, 44)))
+    for n in (N_STATES - 1, N_STATES + 1):
+        with pytest.raises(ValueError, match=r"^information: expected shape \(45, 45\), got "):
+            register(surfels=[], information=np.resize(1e6 * np.eye(N_STATES), (n, N_STATES)))
 
 
 def test_every_slow_state_is_frozen_or_not(register):
-    with pytest.raises(ValueError, match="length 44"):
-        register(surfels=[], frozen=[True] * 19)
+    with pytest.raises(ValueError, match=f"length {N_STATES}"):
+        register(surfels=[], frozen=[True] * (N_STATES - 1))
 
 
 @pytest.mark.parametrize("threads", [-1, 1.5])

@@ -77,3 +77,44 @@ def test_the_lidar_is_behind_the_motor_at_the_angle_beyond_the_zero():
     turn[:3, :3] = geometry.to_matrices(geometry.exp(MOTOR.axis * (0.5 + 0.25)))
     expected = POSE.matrix @ turn @ BEHIND.matrix
     np.testing.assert_allclose(MOTOR.lidar_at(0.5).matrix, expected, rtol=0, atol=1e-15)
+
+
+ZERO = np.zeros(3)
+DRIFTING = Calibration(
+    2e-3,
+    FixedMount(Pose(ZERO, np.array([0.0, 0.0, 0.0, 1.0]))),
+    ZERO,
+    ZERO,
+    ZERO,
+    latency_rate=1e-4,
+    latency_epoch=20.0,
+)
+
+
+def test_a_drifting_clock_is_late_by_more_and_more():
+    stamps = np.array([20.0, 30.0])
+    np.testing.assert_allclose(
+        DRIFTING.measured(stamps), [20.0 - 2e-3, 30.0 - 3e-3], rtol=0, atol=1e-12
+    )
+
+
+def test_another_epoch_means_the_same():
+    stamps = np.linspace(0.0, 100.0, 7)
+    moved = DRIFTING.with_epoch(55.0)
+    assert moved.latency == pytest.approx(5.5e-3)
+    np.testing.assert_allclose(
+        moved.measured(stamps), DRIFTING.measured(stamps), rtol=0, atol=1e-12
+    )
+
+
+def test_a_clock_without_drift_takes_the_latency_off_to_the_bit():
+    stamps = np.random.default_rng(1).uniform(0.0, 1e4, 100)
+    steady = replace(DRIFTING, latency_rate=0.0)
+    assert np.array_equal(steady.measured(stamps), stamps - 2e-3)
+
+
+def test_the_drift_is_kept_in_the_record_and_runs_without_it_are_read():
+    described = DRIFTING.to_json()
+    assert Calibration.from_json(described) == DRIFTING
+    del described["latency_rate"], described["latency_epoch"]
+    assert Calibration.from_json(described).latency_rate == 0.0

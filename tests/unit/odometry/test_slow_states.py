@@ -14,6 +14,7 @@ from bentwing.odometry.continuous.slow_states import (
     SLICES,
     UNIT_STATES,
     SlowStatePrior,
+    at_epoch,
 )
 from bentwing.odometry.start import attitude_of
 from bentwing.recording.sections.imu import Imu
@@ -109,3 +110,12 @@ def test_the_bias_and_the_mount_are_less_certain_by_what_the_unit_adds_to_them()
 def test_without_an_imu_its_states_are_frozen():
     prior = SlowStatePrior(None, has_motor=True, moving=True, frozen=())
     assert all(prior.frozen[SLICES[name]].all() for name in UNIT_STATES)
+
+
+def test_a_latency_is_less_certain_away_from_where_it_was_seen():
+    covariance = np.zeros((N_STATES, N_STATES))
+    covariance[0, 0], rate = 1e-8, np.arange(N_STATES)[SLICES["latency_rate"]]
+    covariance[rate, rate] = 1e-12
+    moved = at_epoch(covariance, 100.0)
+    assert moved[0, 0] == pytest.approx(1e-8 + 100.0**2 * 1e-12)
+    np.testing.assert_allclose(at_epoch(moved, -100.0), covariance, atol=1e-20)

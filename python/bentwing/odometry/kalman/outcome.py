@@ -37,9 +37,12 @@ def estimate_of(
     parts = [p.trajectory() for p in passes if p.windows]
     windows = [w for p in passes for w in p.windows]
     blind = sum(p.blind for p in passes)
+    whole = joined(parts)
+    # One latency for all of it: where the lidar's clock drifts, it is that of the middle.
+    middle = 0.5 * float(whole.times[0] + whole.times[-1])
     return Estimate(
-        joined(parts),
-        passes[-1].calibration,
+        whole,
+        passes[-1].calibration.with_epoch(middle),
         windows=windows,
         counts={
             "kalman.sweeps": len(windows),

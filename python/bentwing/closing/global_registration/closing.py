@@ -216,10 +216,7 @@ def _piece(stretches: Stretches, recorded: Recorded) -> _core.Piece:
     estimate, inertial, payload = recorded.estimate, recorded.inertial, recorded.payload
     used = has_inertial_states(estimate) and payload.imu is not None and len(inertial.times) > 0
     # The map is level, and stays so: gravity is where it belongs, the trajectory may tilt.
-    # An estimator that learns the latency leaves its drift to be learned here.
-    learned = estimate.calibration.std
-    known = {name for name in SLICES if name not in learned}
-    known -= {"latency_rate"} if "latency" in learned else set()
+    known = [name for name in SLICES if name not in estimate.calibration.std]
     prior = SlowStatePrior(
         payload.imu if used else None,
         has_motor=isinstance(estimate.calibration.mount, MotorMount),

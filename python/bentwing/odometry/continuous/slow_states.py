@@ -46,7 +46,7 @@ UNIT_STATES = (
 MOTOR_STATES = ("encoder_zero", "motor_tilt", "motor_offset")
 
 # Standard deviations before anything was measured: s, rad, m, rad/s, m/s², rad, rad, rad, m, s/s. Two
-# crystals are up to 20 ppm off each; what a computer stamps by its own clock is a little more.
+# crystals are up to 20 ppm off each. Where little shows the rate, no more of it should be believed.
 INITIAL_STD = {
     "latency": 3e-3,
     "extrinsic_rotation": 9e-3,
@@ -57,7 +57,7 @@ INITIAL_STD = {
     "encoder_zero": 9e-3,
     "motor_tilt": 9e-3,
     "motor_offset": 3e-3,
-    "latency_rate": 5e-5,
+    "latency_rate": 2e-5,
 }
 # States of which a payload may state that they are less certain.
 DESCRIBED = ("latency", "extrinsic_rotation", "extrinsic_translation")

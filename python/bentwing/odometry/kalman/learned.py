@@ -10,6 +10,7 @@ import numpy as np
 
 from bentwing.base.calibration import STANDARD_GRAVITY
 from bentwing.base.mount import FixedMount, MotorMount, Mount, Pose
+from bentwing.odometry.continuous.slow_states import INITIAL_STD
 from bentwing.odometry.kalman.core import (
     ACCEL_BIAS,
     BASE_ROTATION,
@@ -48,6 +49,8 @@ def calibration_of(
         "gyro_bias": std[GYRO_BIAS],
         "accel_bias": std[ACCEL_BIAS],
         "gravity": std[GRAVITY],
+        # The filter knows one latency at a time; what is not known of its rate the closing learns.
+        "latency_rate": np.array([INITIAL_STD["latency_rate"]]),
     }
     found: Mount = FixedMount(_pose(filter_.base))
     if isinstance(mount, MotorMount):

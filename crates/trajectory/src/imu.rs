@@ -67,7 +67,7 @@ impl Imu {
                 0.0
             };
             let n = if gap > MAX_GAP && gap <= MAX_BRIDGE {
-                (gap / MAX_GAP).ceil() as usize
+                (gap / MAX_GAP) as usize + 1
             } else {
                 1
             };

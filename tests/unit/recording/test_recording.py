@@ -191,6 +191,33 @@ def test_stamps_going_backwards_are_dropped_and_told(tmp_path, ros1):
     assert any("going backwards" in text and "/scan" in text for text in recording.warnings)
 
 
+def test_messages_that_overtook_each_other_are_put_in_order(tmp_path, ros1):
+    stamps = [0.0, 0.04, 0.02, 0.06, 0.08]
+    entries = [("/scan", i / 10, ros1.scan(stamp)) for i, stamp in enumerate(stamps)]
+    (lidar, _, _), recording = read(ros1.write(tmp_path / "a.bag", entries), NO_IMU)
+    times = joined(lidar, "times")
+    assert len(times) == 500
+    assert np.all(np.diff(times) >= 0)
+    assert not recording.warnings
+    assert recording.clocks["lidar"].n == 5
+
+
+def test_late_stamps_of_a_host_are_put_where_the_period_says_and_told(tmp_path, ros1):
+    late = np.zeros(400)
+    late[100::40] = 0.02
+    jitter = np.random.default_rng(3).uniform(0.0, 4e-3, 400)
+    entries = [
+        ("/scan", 0.025 * i + 0.03, ros1.scan(0.025 * i + float(d)))
+        for i, d in enumerate(late + jitter)
+    ]
+    (lidar, _, _), recording = read(ros1.write(tmp_path / "a.bag", entries), NO_IMU)
+    starts = joined(lidar, "times")[::100]
+    off = starts - 0.025 * np.arange(400)
+    assert np.ptp(off) < 1e-3
+    assert recording.clocks["lidar"].n_corrected == 400
+    assert any("the stamps jitter by 1." in text for text in recording.warnings)
+
+
 def test_a_long_gap_is_told_and_what_follows_kept(tmp_path, ros1):
     times = [*np.arange(0, 1, 0.025), *np.arange(31, 32, 0.025)]
     entries = [("/scan", t, ros1.scan(t)) for t in times]

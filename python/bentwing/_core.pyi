@@ -570,6 +570,8 @@ class Piece:
     information : (45, 45) float64 about the prior's mean of the slow states
     offset : (45,) correction that leads from that mean to `globals`
     frozen : (45) slow states that are not estimated
+    shown_noise : times, s, and how large the noise of gyro and accelerometer shows itself then, as
+        standard deviations over the stated ones; without any as stated. Weights stay as stated.
     """
 
     def __new__(
@@ -582,6 +584,7 @@ class Piece:
         information: NDArray[np.float64],
         offset: Sequence[float],
         frozen: Sequence[bool],
+        shown_noise: tuple[list[float], list[tuple[float, float]]],
     ) -> Piece: ...
 
 @final
@@ -614,10 +617,13 @@ class GlobalRegistration:
 
     @property
     def dispersion(self) -> float:
-        """How much more the matches of two stretches scatter together than each for itself."""
+        """How much matches scatter beside what their weights say: their variance over the stated one."""
 
     def pose_covariances(self, piece: int, times: list[float]) -> NDArray[np.float64]:
-        """Covariances (K, 6, 6) of the corrections of a piece at `times`, rows taken as independent."""
+        """Covariances (K, 6, 6) of the corrections of a piece at `times`, as their rows scatter."""
+
+    def relative_covariances(self, piece: int, pairs: list[list[float]]) -> NDArray[np.float64]:
+        """Those of a pose at the second of two times each, as seen from the pose at the first one."""
 
     @property
     def counts(self) -> tuple[int, int, int, int]:

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use bentwing_registration as core;
 use bentwing_registration::{GlobalPrior, GlobalProblem, Health, N_GLOBALS};
 use bentwing_surfels::SurfelSet;
+use nalgebra::Matrix6;
 use numpy::{PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, ToPyArray};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -21,6 +22,7 @@ pub(crate) struct MatchingPlan {
     n_visits: usize,
     min_overlap: f64,
     n_held: usize,
+    posterior_interval: f64,
 }
 
 /// A trajectory without a break, with the surfels of its stretches and what is known of its slow states.
@@ -31,12 +33,13 @@ pub(crate) struct Piece {
     imu: Option<Py<Imu>>,
     globals: Py<Globals>,
     prior: GlobalPrior,
+    shown_noise: core::ShownNoise,
 }
 
 #[pymethods]
 impl Piece {
     #[new]
-    #[pyo3(signature = (samples, surfels, imu, globals, *, information, offset, frozen))]
+    #[pyo3(signature = (samples, surfels, imu, globals, *, information, offset, frozen, shown_noise))]
     #[allow(
         clippy::large_types_passed_by_value,
         reason = "taken from Python as a whole"
@@ -50,7 +53,13 @@ impl Piece {
         information: PyReadonlyArray2<'_, f64>,
         offset: [f64; N_GLOBALS],
         frozen: [bool; N_GLOBALS],
+        shown_noise: (Vec<f64>, Vec<[f64; 2]>),
     ) -> PyResult<Self> {
+        let (times, ratios) = shown_noise;
+        if times.len() != ratios.len() || times.windows(2).any(|t| t[0] >= t[1]) {
+            let message = "shown_noise: expected increasing times, and two ratios for each";
+            return Err(PyValueError::new_err(message));
+        }
         Ok(Self {
             samples,
             chunks: surfels.iter().map(|s| Arc::clone(&s.0)).collect(),
@@ -61,6 +70,7 @@ impl Piece {
                 offset,
                 frozen,
             },
+            shown_noise: core::ShownNoise { times, ratios },
         })
     }
 }
@@ -73,6 +83,7 @@ impl Piece {
             imu: self.imu.as_ref().map(|imu| &imu.get().0),
             globals: self.globals.get().0.clone(),
             prior: &self.prior,
+            shown_noise: self.shown_noise.clone(),
         }
     }
 }
@@ -132,7 +143,7 @@ impl GlobalRegistration {
         fit(&self.0.health)
     }
 
-    /// How much more the matches of two stretches scatter together than each for itself.
+    /// How much matches scatter beside what their weights say: their variance over the stated one.
     #[getter]
     fn dispersion(&self) -> f64 {
         self.0.dispersion
@@ -140,21 +151,28 @@ impl GlobalRegistration {
 
     /// Covariances (K, 6, 6) of the corrections of a piece at `times`, computed when asked for.
     ///
-    /// Rotation first, rad and m, perturbed on the left in the map frame; rows count as independent.
+    /// Rotation first, rad and m, perturbed on the left in the map frame.
     fn pose_covariances<'py>(
         &self,
         py: Python<'py>,
         piece: usize,
         times: Vec<f64>,
     ) -> PyResult<Bound<'py, PyArray3<f64>>> {
-        if piece >= self.0.pieces.len() {
-            let n = self.0.pieces.len();
-            let message = format!("piece: expected less than {n}, got {piece}");
-            return Err(PyValueError::new_err(message));
-        }
-        let found = detached(py, || self.0.posterior.at(piece, &times));
-        let flat: Vec<f64> = found.iter().flat_map(|c| c.iter().copied()).collect();
-        flat.to_pyarray(py).reshape([found.len(), 6, 6])
+        self.piece(piece)?;
+        to_array3(py, &detached(py, || self.0.posterior.at(piece, &times)))
+    }
+
+    /// Covariances (K, 6, 6) of the corrections of a piece at the second of two times each, as seen from
+    /// the pose at the first one; as of `pose_covariances`.
+    fn relative_covariances<'py>(
+        &self,
+        py: Python<'py>,
+        piece: usize,
+        pairs: Vec<[f64; 2]>,
+    ) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        let trajectory = &self.piece(piece)?.trajectory;
+        let found = detached(py, || self.0.posterior.since(piece, trajectory, &pairs));
+        to_array3(py, &found)
     }
 
     /// Unknowns, pairs of stretches, those that do not follow each other, surfels.
@@ -175,6 +193,23 @@ impl GlobalRegistration {
     fn n_blind(&self) -> usize {
         self.0.pieces.iter().map(|p| p.n_blind).sum()
     }
+}
+
+impl GlobalRegistration {
+    fn piece(&self, piece: usize) -> PyResult<&core::PieceResult> {
+        let n = self.0.pieces.len();
+        let message = || format!("piece: expected less than {n}, got {piece}");
+        let found = self.0.pieces.get(piece);
+        found.ok_or_else(|| PyValueError::new_err(message()))
+    }
+}
+
+fn to_array3<'py>(
+    py: Python<'py>,
+    matrices: &[Matrix6<f64>],
+) -> PyResult<Bound<'py, PyArray3<f64>>> {
+    let flat: Vec<f64> = matrices.iter().flat_map(|c| c.iter().copied()).collect();
+    flat.to_pyarray(py).reshape([matrices.len(), 6, 6])
 }
 
 fn fit(health: &Health) -> (f64, f64) {
@@ -199,6 +234,7 @@ pub(crate) fn register_globally(
             n_visits: plan.n_visits,
             min_overlap: plan.min_overlap,
             n_held: plan.n_held,
+            posterior_interval: plan.posterior_interval,
         },
     };
     let settings = settings.into();

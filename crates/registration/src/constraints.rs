@@ -6,6 +6,7 @@ pub mod initial;
 pub mod motion;
 pub mod prior;
 pub mod rest;
+pub mod shown_noise;
 mod stencil;
 pub mod surfel_match;
 pub mod velocity;

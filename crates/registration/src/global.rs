@@ -10,12 +10,14 @@ mod link;
 mod overlap;
 mod posterior;
 mod problem;
+mod result;
 mod scatter;
 
 use gather::Gatherer;
 use joint::Joint;
 pub use posterior::GlobalPosterior;
-pub use problem::{Counts, GlobalProblem, GlobalRegistration, Iteration, Piece, PieceResult, Plan};
+pub use problem::{Counts, GlobalProblem, Iteration, Piece, Plan};
+pub use result::{GlobalRegistration, PieceResult};
 
 use crate::state::{State, StepSize};
 use crate::{N_GLOBALS, NormalEquations, Settings, SolveError, Solver};
@@ -61,7 +63,8 @@ pub fn register_globally(
             break factorized;
         }
     };
-    let (health, dispersion) = gatherer.judge(&states, settings.cauchy_scale);
+    let (posterior, health, dispersion) =
+        GlobalPosterior::new(problem, &states, &mut gatherer, settings)?;
     let counts = Counts {
         n_unknowns: joint.n_unknowns(&states),
         ..gatherer.counts()
@@ -72,10 +75,6 @@ pub fn register_globally(
         globals: state.globals,
         n_blind: state.n_blind,
     };
-    let splines = states.iter().enumerate();
-    let splines = splines
-        .map(|(piece, s)| (s.spline, joint.control(piece, 0)))
-        .collect();
     let pieces = states.into_iter().enumerate().map(finish).collect();
     Ok(GlobalRegistration {
         pieces,
@@ -84,11 +83,7 @@ pub fn register_globally(
         dispersion,
         counts,
         converged: step_size.converged(settings),
-        posterior: GlobalPosterior {
-            factorized,
-            splines,
-            n_controls: joint.n_controls(),
-        },
+        posterior,
     })
 }
 

@@ -14,6 +14,7 @@ mod state;
 mod system;
 mod window;
 
+pub use constraints::shown_noise::ShownNoise;
 pub use global::{
     Counts, GlobalPosterior, GlobalProblem, GlobalRegistration, Iteration, Piece, PieceResult,
     Plan, register_globally,

@@ -8,6 +8,7 @@ use bentwing_surfels::SurfelSet;
 use bentwing_trajectory::{CorrectionSpline, Imu, Trajectory};
 use nalgebra::Vector3;
 
+use crate::constraints::shown_noise::ShownNoise;
 use crate::constraints::{imu, initial, motion, prior, rest, velocity};
 use crate::placed::Placed;
 use crate::{GlobalPrior, GlobalVector, Globals, NormalEquations, Settings, Solution, SolveError};
@@ -93,6 +94,18 @@ impl<'a> State<'a> {
         }
     }
 
+    /// The same state with knots at another interval, s.
+    pub fn with_knots(&self, interval: f64) -> Self {
+        let (start, end) = (self.trajectory.start(), self.trajectory.end());
+        Self {
+            rests: self.rests.clone(),
+            trajectory: self.trajectory.clone(),
+            globals: self.globals.clone(),
+            spline: CorrectionSpline::covering(start, end, interval),
+            ..*self
+        }
+    }
+
     /// The same; where the trajectory rests it goes on resting.
     pub fn resting(self) -> Self {
         Self {
@@ -112,6 +125,16 @@ impl<'a> State<'a> {
         first: Option<&initial::Sigmas>,
         settings: &Settings,
     ) -> NormalEquations {
+        self.noisy_rows(first, settings, &ShownNoise::default())
+    }
+
+    /// The same, those of the IMU with the variance that their residuals show; their weights stay.
+    pub fn noisy_rows(
+        &mut self,
+        first: Option<&initial::Sigmas>,
+        settings: &Settings,
+        shown: &ShownNoise,
+    ) -> NormalEquations {
         let mut equations = NormalEquations::new(self.spline.n_controls());
         let (trajectory, spline) = (&self.trajectory, &self.spline);
         velocity::add(&mut equations, spline, settings);
@@ -123,7 +146,8 @@ impl<'a> State<'a> {
         match self.imu {
             Some(samples) => {
                 let (g, noise) = (&self.globals, &settings.imu_noise);
-                self.n_blind = imu::add(&mut equations, trajectory, samples, g, spline, noise);
+                self.n_blind =
+                    imu::add(&mut equations, trajectory, samples, g, spline, noise, shown);
             }
             None => motion::add(&mut equations, trajectory, spline, settings),
         }

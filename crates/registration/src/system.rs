@@ -6,6 +6,7 @@ mod error;
 mod exported;
 mod layout;
 pub(crate) mod normal_equations;
+mod quadratic;
 pub(crate) mod response;
 mod rows;
 pub(crate) mod solve;

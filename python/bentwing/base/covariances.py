@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
+SHORT = 10.0
+"""m, of the path over which short-term errors are stated."""
+
 _UPPER = np.triu_indices(6)
 _NAMES = ("rx", "ry", "rz", "x", "y", "z")
 _COLUMNS = " ".join(f"{_NAMES[i]}.{_NAMES[j]}" for i, j in zip(*_UPPER, strict=True))
@@ -56,10 +59,6 @@ class PoseCovariances(Value):
         flat = self.matrices.reshape(len(self.times), 36)
         parts = [np.interp(times, self.times, part) for part in flat.T]
         return np.stack(parts, axis=-1).reshape(-1, 6, 6)
-
-    def scaled(self, factor: float) -> PoseCovariances:
-        """Return them all times a factor."""
-        return PoseCovariances(self.times, factor * self.matrices)
 
     def levelled(self, positions: Array, gravity_std: Array) -> PoseCovariances:
         """Add what the doubt about the vertical makes of poses.
@@ -116,6 +115,20 @@ class PoseCovariances(Value):
         matrices[:, _UPPER[0], _UPPER[1]] = rows
         matrices[:, _UPPER[1], _UPPER[0]] = rows
         return cls((stamps_ns - clock_origin_ns) / NS_PER_S, matrices)
+
+
+def short_pairs(times: Array, positions: Array) -> NDArray[np.intp]:
+    """Return pairs (M, 2) of poses between which the path is ten metres long, or next above that.
+
+    Parameters
+    ----------
+    times : (K,) s, increasing
+    positions : (K, 3) m
+    """
+    path = np.concatenate([[0.0], np.linalg.norm(np.diff(positions, axis=0), axis=1).cumsum()])
+    last = np.arange(len(times))
+    first = np.searchsorted(path, path - SHORT, side="right") - 1
+    return np.stack([first, last], axis=1)[first >= 0]
 
 
 def levelled_covariances(covariances: Array, positions: Array, gravity_std: Array) -> Array:

@@ -9,6 +9,9 @@ from typing import TYPE_CHECKING
 from bentwing.base.value import Value
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from bentwing.base.breaks import Break
     from bentwing.base.calibration import Calibration
     from bentwing.base.covariances import PoseCovariances
@@ -33,6 +36,8 @@ class Estimate(Value):
     segments : first and last time of each stretch without a break, s; between them the trajectory
         is a guess
     covariances : of the poses; None where the estimator has none
+    short_variances : (6,) of `[δr, δt]`, rad² and m², of a pose as seen from the one ten metres of path
+        before it, in the mean; None where the estimator does not say, or the path is shorter
     """
 
     trajectory: Trajectory
@@ -45,6 +50,7 @@ class Estimate(Value):
     breaks: list[Break] = field(default_factory=list)
     segments: list[tuple[float, float]] = field(default_factory=list)
     covariances: PoseCovariances | None = None
+    short_variances: NDArray[np.float64] | None = None
 
     @property
     def warnings(self) -> list[str]:

@@ -8,13 +8,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bentwing.base.covariances import SHORT
+
 if TYPE_CHECKING:
-    from bentwing.base.covariances import PoseCovariances
-    from bentwing.base.trajectory import Trajectory
+    from numpy.typing import NDArray
+
+    from bentwing.base.estimate import Estimate
+    from bentwing.evaluate.map import Thickness
 
 # Within this many standard deviations lie 68 % of the errors in a plane.
 _IN_A_PLANE = 1.51
-_SHORT = 10.0  # m, of the second statement
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,10 +28,10 @@ class ExpectedAccuracy:
     ----------
     horizontal, vertical : m, of the least certain pose
     heading : rad, of the least certain pose
-    horizontal_per_10m, vertical_per_10m, heading_per_10m : over ten metres of the path, with an error
-        that adds up as a random walk
-    map_thickness : m, standard deviation of points across their surface: noise of the ranges, and of
-        the poses over ten metres
+    horizontal_per_10m, vertical_per_10m, heading_per_10m : of a pose as seen from the one ten metres of
+        path before, in the mean
+    map_thickness : m, standard deviation of points across flat surfaces of the map, as measured over
+        all visits; without any of the ranges' noise and of the poses over ten metres
     """
 
     horizontal: float
@@ -50,33 +53,39 @@ class ExpectedAccuracy:
 
 
 def expected_accuracy(
-    trajectory: Trajectory, covariances: PoseCovariances | None, range_sigma: float
+    estimate: Estimate, range_sigma: float, walls: Thickness | None = None
 ) -> ExpectedAccuracy | None:
-    """Return what to expect of a trajectory and the map it makes; None without covariances.
+    """Return what to expect of an estimate and the map it makes; None where it has no covariances.
 
     Parameters
     ----------
     range_sigma : m, noise of the lidar's ranges
+    walls : how thick flat surfaces are in the map, if there are any
     """
+    covariances = estimate.covariances
     if covariances is None or not len(covariances.times):
         return None
-    variances = np.einsum("kii->ki", covariances.matrices).max(axis=0)
+    whole = np.einsum("kii->ki", covariances.matrices).max(axis=0)
+    short = estimate.short_variances
+    if short is None:
+        short = min(1.0, SHORT / max(_path(estimate), 1e-9)) * whole
+    of_poses = float(np.sqrt(short[3:].mean()))
+    thickness = float(np.hypot(range_sigma, of_poses)) if walls is None else walls.median
+    return ExpectedAccuracy(*_radii(whole), *_radii(short), map_thickness=thickness)
+
+
+def _radii(variances: NDArray[np.float64]) -> tuple[float, float, float]:
+    """Return what 68 % of the errors are below: horizontally, vertically, m, and in heading, rad."""
     horizontal = _IN_A_PLANE * float(np.sqrt(variances[3:5].mean()))
-    vertical, heading = float(np.sqrt(variances[5])), float(np.sqrt(variances[2]))
-    times = covariances.times
+    return horizontal, float(np.sqrt(variances[5])), float(np.sqrt(variances[2]))
+
+
+def _path(estimate: Estimate) -> float:
+    """Return the length of the path between the poses that have covariances, m."""
+    trajectory = estimate.trajectory
+    times = estimate.covariances.times if estimate.covariances is not None else np.empty(0)
     positions, _ = trajectory.interpolate(times[trajectory.covers(times)])
-    path = float(np.linalg.norm(np.diff(positions, axis=0), axis=1).sum())
-    share = float(np.sqrt(_SHORT / max(_SHORT, path)))
-    of_poses = share * float(np.sqrt(variances[3:].mean()))
-    return ExpectedAccuracy(
-        horizontal,
-        vertical,
-        heading,
-        share * horizontal,
-        share * vertical,
-        share * heading,
-        float(np.hypot(range_sigma, of_poses)),
-    )
+    return float(np.linalg.norm(np.diff(positions, axis=0), axis=1).sum())
 
 
 def _named(horizontal: float, vertical: float, heading: float) -> str:

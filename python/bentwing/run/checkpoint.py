@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 NAME = "checkpoint.npz"
 _TRAJECTORY = ("times", "positions", "quats_xyzw")
 _COVARIANCES = ("covariance_times", "covariance_matrices")
+_SHORT = "short_variances"
 _OF_ESTIMATE = ("windows", "counts", "timings", "health", "notes", "breaks", "segments")
 _CORRECTIONS = ("localization", "loop_closure", "merging")
 # What must be the same for a run to go on; the number of threads changes no bit.
@@ -66,6 +67,8 @@ class Checkpoint:
                 name: getattr(covariances, name.removeprefix("covariance_"))
                 for name in _COVARIANCES
             }
+        if estimate.short_variances is not None:
+            arrays[_SHORT] = estimate.short_variances
         described = {
             "stage": stage,
             "asked": self._asked(),
@@ -157,6 +160,7 @@ def _found(arrays: dict[str, Any], described: dict[str, Any]) -> Found:
     trajectory = Trajectory(*(arrays[name] for name in _TRAJECTORY))
     known = _COVARIANCES[0] in arrays
     fields["covariances"] = PoseCovariances(*(arrays[n] for n in _COVARIANCES)) if known else None
+    fields[_SHORT] = arrays.get(_SHORT)
     return Found(
         Estimate(trajectory, Calibration.from_json(described["calibration"]), **fields),
         Reading(**described["reading"]),

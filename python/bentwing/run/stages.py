@@ -134,7 +134,9 @@ def place_on_earth(job: Job, found: Found) -> Found:
         return found
     if placed.trajectory is not estimate.trajectory:
         # Bent by fixes, it is no longer what the covariances are of.
-        estimate = replace(estimate, trajectory=placed.trajectory, covariances=None)
+        estimate = replace(
+            estimate, trajectory=placed.trajectory, covariances=None, short_variances=None
+        )
     warnings = (*found.stage_warnings, *placed.warnings)
     return replace(found, estimate=estimate, placed=placed, stage_warnings=warnings)
 
@@ -158,7 +160,7 @@ def make_map(job: Job, found: Found) -> Found:
         )
     sigma = part.payload.lidar.range_sigma
     evidence = judge_revisits(written.revisits, sigma)
-    accuracy = expected_accuracy(estimate.trajectory, estimate.covariances, sigma)
+    accuracy = expected_accuracy(estimate, sigma, written.walls)
     return replace(found, map=written, accuracy=accuracy, evidence=(*found.evidence, *evidence))
 
 

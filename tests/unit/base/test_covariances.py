@@ -4,7 +4,7 @@ import pytest
 
 from bentwing import InputError
 from bentwing.base import geometry
-from bentwing.base.covariances import PoseCovariances, carried
+from bentwing.base.covariances import PoseCovariances, carried, short_pairs
 
 ORIGIN_NS = 1_600_000_000_123_456_789
 
@@ -64,9 +64,19 @@ def test_what_is_fixed_to_a_pose_moves_with_its_turns():
     np.testing.assert_allclose(found, expected, atol=0.05 * expected.max())
 
 
-def test_doubt_about_the_vertical_lifts_what_is_far_away(covariances):
+def test_doubt_about_the_vertical_lifts_what_is_far_away():
     still = PoseCovariances(np.array([0.0]), np.zeros((1, 6, 6)))
     (found,) = still.levelled(np.array([[10.0, 0.0, 0.0]]), np.array([0.0, 1e-3])).matrices
     std = np.sqrt(np.diag(found))
     np.testing.assert_allclose(std, [0.0, 1e-3, 0.0, 0.0, 0.0, 1e-2])
-    assert covariances.scaled(4.0).matrices[0, 0, 0] == 4.0 * covariances.matrices[0, 0, 0]
+
+
+def test_pairs_are_ten_metres_of_path_apart_and_not_of_distance():
+    times = np.arange(0.0, 12.0)
+    there_and_back = np.minimum(2.0 * times, 24.0 - 2.0 * times)  # 2 m a second
+    positions = np.stack([there_and_back, 0.0 * times, 0.0 * times], axis=1)
+    pairs = short_pairs(times, positions)
+    np.testing.assert_array_equal(pairs[:, 1] - pairs[:, 0], 5)
+    assert pairs[0].tolist() == [0, 5]
+    assert pairs[-1].tolist() == [6, 11]
+    assert short_pairs(times[:5], positions[:5]).shape == (0, 2)

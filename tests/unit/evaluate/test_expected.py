@@ -1,10 +1,16 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from bentwing.base.calibration import Calibration
 from bentwing.base.covariances import PoseCovariances
+from bentwing.base.estimate import Estimate
+from bentwing.base.mount import FixedMount, Pose
 from bentwing.base.trajectory import Trajectory
 from bentwing.evaluate.expected import expected_accuracy
+from bentwing.evaluate.map import Thickness
 
 STD = np.array([1e-3, 1e-3, 2e-3, 0.02, 0.02, 0.01])
 
@@ -15,11 +21,17 @@ def along_x(length):
     return Trajectory(times, positions, np.tile([0.0, 0.0, 0.0, 1.0], (11, 1)))
 
 
+def estimated(length, short=None):
+    level = Pose(np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]))
+    nothing = Calibration(0.0, FixedMount(level), np.zeros(3), np.zeros(3), np.array([0, 0, 9.8]))
+    return Estimate(along_x(length), nothing, covariances=COVARIANCES, short_variances=short)
+
+
 COVARIANCES = PoseCovariances(np.array([0.0, 10.0]), np.stack([np.zeros((6, 6)), np.diag(STD**2)]))
 
 
-def test_the_least_certain_pose_speaks_for_the_whole_and_ten_metres_for_their_share():
-    found = expected_accuracy(along_x(40.0), COVARIANCES, 0.01)
+def test_the_least_certain_pose_speaks_for_the_whole_and_without_better_ten_metres_for_their_share():
+    found = expected_accuracy(estimated(40.0), 0.01)
     # In a plane 68 % of the errors are within σ √(-2 ln 0.32).
     assert found.horizontal == pytest.approx(0.02 * np.sqrt(-2 * np.log(0.32)), rel=2e-3)
     assert found.vertical == pytest.approx(0.01)
@@ -28,16 +40,28 @@ def test_the_least_certain_pose_speaks_for_the_whole_and_ten_metres_for_their_sh
     assert found.map_thickness > 0.01
 
 
+def test_ten_metres_are_as_uncertain_as_the_estimate_says():
+    found = expected_accuracy(estimated(40.0, (0.1 * STD) ** 2), 0.01)
+    assert found.vertical_per_10m == pytest.approx(1e-3)
+    assert found.heading_per_10m == pytest.approx(2e-4)
+    assert found.vertical == pytest.approx(0.01)
+
+
+def test_the_map_is_as_thick_as_its_walls_are_measured():
+    walls = Thickness(0.012, 0.01, 0.02, 0.03, np.zeros((1, 3)), np.array([0.012]))
+    assert expected_accuracy(estimated(40.0), 0.01, walls).map_thickness == 0.012
+
+
 def test_of_a_short_path_ten_metres_are_the_whole():
-    found = expected_accuracy(along_x(4.0), COVARIANCES, 0.01)
+    found = expected_accuracy(estimated(4.0), 0.01)
     assert found.vertical_per_10m == found.vertical
 
 
 def test_the_sentence_has_figures_with_units():
-    sentence = expected_accuracy(along_x(40.0), COVARIANCES, 0.01).sentence()
+    sentence = expected_accuracy(estimated(40.0), 0.01).sentence()
     assert "30 mm horizontally, 10 mm vertically and 0.11° in heading" in sentence
     assert "68 %" in sentence
 
 
 def test_without_covariances_nothing_is_expected():
-    assert expected_accuracy(along_x(4.0), None, 0.01) is None
+    assert expected_accuracy(replace(estimated(4.0), covariances=None), 0.01) is None

@@ -6,6 +6,7 @@ use bentwing_trajectory::{
 };
 use nalgebra::{Matrix3, Vector3};
 
+use super::shown_noise::ShownNoise;
 use super::stencil::{StencilRows, add_stencil};
 use crate::globals::OFF_DIAGONAL;
 use crate::{GlobalVector, Globals, ImuNoise, N_GLOBALS, NormalEquations, index};
@@ -42,14 +43,18 @@ pub(crate) struct SampleRows {
 }
 
 impl SampleRows {
-    fn add(&self, rows: &mut StencilRows<'_>, sigma: f64) {
+    /// Adds the rows, with the weight of a sigma and as much more noise than that as is shown.
+    fn add(&self, rows: &mut StencilRows<'_>, stated: f64, shown: f64) {
         let group = rows.group(self.first);
         for row in 0..3 {
             group.knots_mut().copy_from_slice(&self.knots[row]);
             group
                 .globals_mut()
                 .copy_from_slice(&self.globals[row][index::INERTIAL]);
-            group.add(self.residual[row], sigma.powi(-2));
+            group.add(
+                self.residual[row],
+                stated.powi(-2) * (shown / stated).powi(2),
+            );
         }
     }
 }
@@ -62,18 +67,20 @@ pub fn add(
     globals: &Globals,
     spline: &CorrectionSpline,
     noise: &ImuNoise,
+    shown: &ShownNoise,
 ) -> usize {
     let mut rows = StencilRows::new(equations);
     let mut n_blind = 0;
     for n in 0..trajectory.len() - 1 {
+        let now = shown.at(trajectory.time(n), noise);
         match gyro_rows(trajectory, imu, globals, spline, n) {
-            Some(said) => said.add(&mut rows, noise.gyro),
+            Some(said) => said.add(&mut rows, noise.gyro, now.gyro),
             None => n_blind += 1,
         }
         if n > 0
             && let Some(said) = accel_rows(trajectory, imu, globals, spline, n)
         {
-            said.add(&mut rows, noise.accel);
+            said.add(&mut rows, noise.accel, now.accel);
         }
     }
     rows.flush();
@@ -219,7 +226,7 @@ mod tests {
                 |equations| {
                     let mut rows = StencilRows::new(equations);
                     let (t, g) = (&scene.trajectory, &scene.globals);
-                    gyro_rows_of(t, g, &scene.spline(), n, &said).add(&mut rows, sigma);
+                    gyro_rows_of(t, g, &scene.spline(), n, &said).add(&mut rows, sigma, sigma);
                     rows.flush();
                 },
                 |t, g| (gyro_residual(t, g, n, &said) / sigma).as_slice().to_vec(),
@@ -239,7 +246,7 @@ mod tests {
                 |equations| {
                     let mut rows = StencilRows::new(equations);
                     let (t, g) = (&scene.trajectory, &scene.globals);
-                    accel_rows_of(t, g, &scene.spline(), n, &node).add(&mut rows, sigma);
+                    accel_rows_of(t, g, &scene.spline(), n, &node).add(&mut rows, sigma, sigma);
                     rows.flush();
                 },
                 |t, g| (accel_residual(t, g, n, &node) / sigma).as_slice().to_vec(),

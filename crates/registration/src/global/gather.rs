@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use pulp::Arch;
 use rayon::prelude::*;
 
-use super::chunk::{Chunk, Holder, Laid};
+use super::chunk::{Chunk, Holder};
 use super::joint::Joint;
 use super::link::{Link, LinkEquations, LinkMatch, LinkSum};
 use super::overlap::{follow, links};
@@ -79,7 +79,7 @@ impl Gatherer {
         scale: f64,
     ) -> (Health, usize) {
         let (mut health, mut n_far) = (Health::default(), 0);
-        self.each(states, joint, scale, |link, part| {
+        self.each(states, joint, scale, false, |link, part| {
             let piece = link.pieces[0];
             joint.add(equations, &part.equations, &part.controls, piece);
             health.merge(&part.health);
@@ -92,13 +92,22 @@ impl Gatherer {
         (health, n_far)
     }
 
-    /// How the matches fit, and how much more they scatter together than each for itself.
-    pub fn judge(&mut self, states: &[State<'_>], scale: f64) -> (Health, f64) {
-        let joint = Joint::new(states);
-        let (mut health, mut scatter) = (Health::default(), Scatter::new(joint.n_controls()));
-        self.each(states, &joint, scale, |_, part| {
+    /// Adds the rows of all matches; returns how they fit, and how much they scatter beside what their
+    /// weights say.
+    pub fn judge(
+        &mut self,
+        equations: &mut NormalEquations,
+        joint: &Joint,
+        states: &[State<'_>],
+        scale: f64,
+    ) -> (Health, f64) {
+        let (mut health, mut scatter) = (Health::default(), Scatter::new());
+        self.each(states, joint, scale, true, |link, mut part| {
+            joint.add(equations, &part.equations, &part.controls, link.pieces[0]);
             health.merge(&part.health);
-            scatter.add(&part.equations, &part.controls);
+            let poses = (0..part.controls.len()).filter(|&k| part.controls[k] < joint.stand_in(0));
+            let diagonals = poses.map(|k| part.equations.diagonal(k));
+            scatter.add(std::mem::take(&mut part.pulls), diagonals);
         });
         (health, scatter.dispersion())
     }
@@ -108,7 +117,8 @@ impl Gatherer {
         states: &[State<'_>],
         joint: &Joint,
         scale: f64,
-        mut take: impl FnMut(&Link, &LinkEquations),
+        judged: bool,
+        mut take: impl FnMut(&Link, LinkEquations),
     ) {
         let (chunks, settings, stale) = (&self.chunks, &self.settings, self.stale);
         let mut holder = Holder::new(self.n_held, stale.then_some(settings));
@@ -122,8 +132,17 @@ impl Gatherer {
                     let laid = [holder.get(link.a)?, holder.get(link.b)?];
                     let found = stale.then(|| link.find(laid[0], laid[1], settings));
                     let matches = found.as_deref().unwrap_or(&link.matches);
-                    let sum = sum(link, matches, laid, states, joint, scale);
-                    Some((found, sum))
+                    let sum = LinkSum {
+                        link,
+                        matches,
+                        laid,
+                        states,
+                        joint,
+                        scale,
+                        judged,
+                    };
+                    let equations = equations_of(sum);
+                    Some((found, equations))
                 })
                 .collect();
             for (link, sum) in wave.iter_mut().zip(sums) {
@@ -133,29 +152,15 @@ impl Gatherer {
                 if let Some(matches) = found {
                     link.matches = matches;
                 }
-                take(link, &equations);
+                take(link, equations);
             }
         }
         self.stale = false;
     }
 }
 
-/// Equations of `matches` of a link.
-pub(super) fn sum(
-    link: &Link,
-    matches: &[LinkMatch],
-    laid: [&Laid; 2],
-    states: &[State<'_>],
-    joint: &Joint,
-    scale: f64,
-) -> LinkEquations {
+/// The rows of a link, summed.
+pub(super) fn equations_of(sum: LinkSum<'_>) -> LinkEquations {
     // The widest instructions of the machine; the order of operations is the same.
-    Arch::new().dispatch(LinkSum {
-        link,
-        matches,
-        laid,
-        states,
-        joint,
-        scale,
-    })
+    Arch::new().dispatch(sum)
 }

@@ -6,11 +6,13 @@
     reason = "only what is inlined into a dispatched function uses the machine's instructions"
 )]
 
+use bentwing_voxels::{VoxelKey, voxel_of};
 use pulp::{Simd, WithSimd};
 
 use super::bend;
 use super::chunk::Laid;
 use super::joint::{Joint, N_HEAD_STAND_INS};
+use super::scatter::Pulls;
 use crate::constraints::surfel_match::{self, MatchPlane};
 use crate::neighbors::{Search, claimed_pairs};
 use crate::placed::PlacedSurfel;
@@ -164,6 +166,8 @@ pub struct LinkSum<'a> {
     pub states: &'a [State<'a>],
     pub joint: &'a Joint,
     pub scale: f64,
+    /// Whether it is asked what the matches pull.
+    pub judged: bool,
 }
 
 /// Equations of a link, their control points in the whole system, and its health.
@@ -171,6 +175,8 @@ pub struct LinkEquations {
     pub equations: NormalEquations,
     pub controls: Vec<usize>,
     pub health: Health,
+    /// What the matches pull, if it was asked for.
+    pub pulls: Pulls,
 }
 
 impl WithSimd for LinkSum<'_> {
@@ -208,10 +214,42 @@ impl LinkSum<'_> {
             rows.flush(&mut equations);
         }
         LinkEquations {
+            pulls: if self.judged {
+                self.pulls()
+            } else {
+                Pulls::new()
+            },
             equations,
             controls: places.controls,
             health,
         }
+    }
+
+    /// What the matches pull at each control point, patch by patch of the coarsest voxels.
+    fn pulls(&self) -> Pulls {
+        let edge = self.laid[0].placed.voxel_sizes.last().copied();
+        let mut pulls = Pulls::new();
+        for m in self.matches {
+            let [surfel, other] = self.surfels(m);
+            let n = &m.plane.normal(surfel);
+            let mut row = [0.0; 48];
+            surfel_match::write_knots(&mut row[..24], surfel, n, 1.0);
+            surfel_match::write_knots(&mut row[24..], other, n, -1.0);
+            let residual = n.dot(&(surfel.mean - other.mean)) + m.offset;
+            let w = cauchy_weight(residual * m.plane.information.sqrt(), self.scale);
+            let middle = 0.5 * (surfel.mean + other.mean);
+            let patch = VoxelKey::new(voxel_of(&middle.into(), edge.unwrap_or(1.0)));
+            let sides = [surfel, other].into_iter().zip(self.link.pieces);
+            let controls = sides
+                .flat_map(|(s, p)| (0..4).map(move |k| self.joint.control(p, s.basis.first + k)));
+            for (entries, control) in row.chunks_exact(6).zip(controls) {
+                let sum = pulls.entry((patch, control)).or_default();
+                for (to, entry) in sum.iter_mut().zip(entries) {
+                    *to += w * m.plane.information * residual * entry;
+                }
+            }
+        }
+        pulls
     }
 
     #[inline(always)]

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! What goes into a global registration and what comes out.
+//! What goes into a global registration, and what is counted on the way.
 
 use std::sync::Arc;
 
 use bentwing_surfels::SurfelSet;
 use bentwing_trajectory::{Imu, Trajectory};
 
-use super::posterior::GlobalPosterior;
 use crate::constraints::initial;
+use crate::constraints::shown_noise::ShownNoise;
 use crate::state::State;
-use crate::{GlobalMatrix, GlobalPrior, Globals, Health, Settings, StepSize};
+use crate::{GlobalPrior, Globals, Health, Settings, StepSize};
 
 /// A trajectory without a break, with what was measured along it.
 pub struct Piece<'a> {
@@ -19,6 +19,8 @@ pub struct Piece<'a> {
     pub chunks: &'a [Arc<SurfelSet>],
     /// Inertial samples, less the history of their biases, or none for a lidar alone.
     pub imu: Option<&'a Imu>,
+    /// How large their noise shows itself: so uncertain the poses are, while the weights stay as stated.
+    pub shown_noise: ShownNoise,
     /// Global states to start from.
     pub globals: Globals,
     /// What is known of them.
@@ -57,6 +59,8 @@ pub struct Plan {
     pub min_overlap: f64,
     /// Stretches that are held as placed in the map.
     pub n_held: usize,
+    /// Interval of the knots by which covariances are computed, s.
+    pub posterior_interval: f64,
 }
 
 /// Input of a global registration.
@@ -89,36 +93,4 @@ pub struct Counts {
     pub n_far_links: usize,
     /// Surfels of all stretches.
     pub n_surfels: usize,
-}
-
-/// A corrected trajectory.
-#[derive(Clone, Debug)]
-pub struct PieceResult {
-    /// Corrected trajectory.
-    pub trajectory: Trajectory,
-    /// Corrected global states.
-    pub globals: Globals,
-    /// Covariance of the global states; zero where frozen.
-    pub covariance: GlobalMatrix,
-    /// Samples without inertial data.
-    pub n_blind: usize,
-}
-
-/// Result of a global registration.
-#[derive(Clone, Debug)]
-pub struct GlobalRegistration {
-    /// The trajectories in the order of the problem.
-    pub pieces: Vec<PieceResult>,
-    /// What was done, iteration by iteration.
-    pub iterations: Vec<Iteration>,
-    /// Matches of the final trajectories.
-    pub health: Health,
-    /// How much more the matches of two stretches scatter together than each for itself.
-    pub dispersion: f64,
-    /// How much there was to do.
-    pub counts: Counts,
-    /// Whether the last step was below the thresholds.
-    pub converged: bool,
-    /// The last equations.
-    pub posterior: GlobalPosterior,
 }

@@ -10,6 +10,7 @@ use nalgebra::{DMatrix, Isometry3, Matrix3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
 use super::*;
+use crate::constraints::shown_noise::ShownNoise;
 use crate::constraints::testing::{Scene, settings};
 use crate::placed::place;
 use crate::{GlobalMatrix, GlobalPrior, Globals};
@@ -105,6 +106,7 @@ fn plan() -> Plan {
         n_visits: 4,
         min_overlap: 0.15,
         n_held: 64,
+        posterior_interval: 0.5,
     }
 }
 
@@ -150,6 +152,7 @@ fn a_slow_drift_is_taken_out_of_laps_through_a_room() -> Result<(), SolveError> 
         trajectory: drifted.clone(),
         chunks: &chunks,
         imu: None,
+        shown_noise: ShownNoise::default(),
         globals,
         prior: &prior,
     };
@@ -176,6 +179,17 @@ fn a_slow_drift_is_taken_out_of_laps_through_a_room() -> Result<(), SolveError> 
         "{together:?}"
     );
     assert!((stds(&times[9..10])[0] / together[9] - 1.0).abs() < 1e-9);
+    // As seen from the first pose, which is held, a pose is as certain as it is.
+    let [first, last] = [times[0], times[9]];
+    let piece = &found.pieces[0].trajectory;
+    let since = found
+        .posterior
+        .since(0, piece, &[[first, last], [last, last]]);
+    assert!(
+        (since[0][(3, 3)].sqrt() / together[9] - 1.0).abs() < 0.05,
+        "{since:?}"
+    );
+    assert!(since[1].norm() < 1e-12, "{since:?}");
     Ok(())
 }
 
@@ -198,6 +212,7 @@ fn a_second_piece_with_its_own_latency_joins_the_first() -> Result<(), SolveErro
                 trajectory: held,
                 chunks: &a,
                 imu: None,
+                shown_noise: ShownNoise::default(),
                 globals: first,
                 prior: &prior_of_first,
             },
@@ -205,6 +220,7 @@ fn a_second_piece_with_its_own_latency_joins_the_first() -> Result<(), SolveErro
                 trajectory: shifted,
                 chunks: &b,
                 imu: None,
+                shown_noise: ShownNoise::default(),
                 globals: second,
                 prior: &prior_of_second,
             },
@@ -233,6 +249,7 @@ fn neither_threads_nor_what_is_held_change_a_bit() -> Result<(), SolveError> {
             trajectory: trajectory(0.0, 40.0, slow_drift),
             chunks: &chunks,
             imu: None,
+            shown_noise: ShownNoise::default(),
             globals: globals.clone(),
             prior: &prior,
         };
@@ -268,6 +285,7 @@ fn a_stretch_is_matched_with_few_others_however_often_it_is_seen() {
         trajectory: trajectory(0.0, 60.0, |_| Vector3::zeros()),
         chunks: &chunks,
         imu: None,
+        shown_noise: ShownNoise::default(),
         globals,
         prior: &prior,
     };
@@ -303,6 +321,7 @@ proptest! {
             trajectory: scene.trajectory.clone(),
             chunks: &chunks,
             imu: None,
+            shown_noise: ShownNoise::default(),
             globals: scene.globals.clone(),
             prior: &known,
         };
@@ -321,7 +340,10 @@ proptest! {
         let apart = laid[0].placed.surfels[2].mean - laid[1].placed.surfels[j].mean;
         let residual = n.dot(&apart) + offset;
         prop_assume!(residual.abs() > 1e-3);
-        let part = gather::sum(&link, &link.matches, [&laid[0], &laid[1]], &states, &joint, 1e12);
+        let part = gather::equations_of(link::LinkSum {
+            link: &link, matches: &link.matches, laid: [&laid[0], &laid[1]], states: &states,
+            joint: &joint, scale: 1e12, judged: false,
+        });
         let mut equations = NormalEquations::new(joint.n_controls());
         joint.add(&mut equations, &part.equations, &part.controls, 0);
         let row = |u: usize| equations.knot_gradient(u / 6)[u % 6] / (information * residual);

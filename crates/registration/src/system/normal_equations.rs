@@ -111,6 +111,22 @@ impl NormalEquations {
         self.cost += other.cost;
     }
 
+    /// Takes a multiple of other equations of the same unknowns away; what is left has a matrix only.
+    pub(crate) fn take_away(&mut self, factor: f64, other: &Self) {
+        for ((row, column), block) in other.blocks() {
+            let target = self.block_mut(row, column).as_flattened_mut();
+            for (to, from) in target.iter_mut().zip(block.as_flattened()) {
+                *to -= factor * from;
+            }
+        }
+        let arrows = other.arrow.as_flattened().as_flattened();
+        let targets = self.arrow.as_flattened_mut().as_flattened_mut();
+        for (to, from) in targets.iter_mut().zip(arrows) {
+            *to -= factor * from;
+        }
+        self.corner -= factor * other.corner;
+    }
+
     pub(crate) fn arrow_mut(&mut self, control: usize) -> &mut [[f64; 6]; N_GLOBALS] {
         &mut self.arrow[control]
     }

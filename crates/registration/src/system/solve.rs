@@ -12,6 +12,7 @@ use super::dense::DenseLlt;
 use super::error::SolveError;
 use super::layout::Layout;
 use super::normal_equations::NormalEquations;
+use super::quadratic::quadratic;
 use super::response::{PoseResponse, UNMOVED, followed};
 use super::sparse::Pattern;
 use crate::globals::{GlobalMatrix, GlobalVector, N_GLOBALS};
@@ -152,6 +153,27 @@ impl Factorized {
     /// Joint covariance of linear functions of the unknowns: each column of `rows` has six entries
     /// per control point, then those of the global states.
     pub fn covariance_of(&self, rows: &Mat<f64>, ties: &[PoseResponse]) -> DMatrix<f64> {
+        let free = self.free(rows, ties);
+        symmetric(&(free.transpose() * self.factor.solve(&free)))
+    }
+
+    /// The same where the errors of the rows do not have the variance that their weights state, but
+    /// `factor` times that, and beyond it what `excess` has (Huber 1967: `H⁻¹ M H⁻¹` with the variance
+    /// `M` of the gradient).
+    pub fn sandwich_of(
+        &self,
+        rows: &Mat<f64>,
+        factor: f64,
+        excess: &NormalEquations,
+    ) -> DMatrix<f64> {
+        let free = self.free(rows, &[]);
+        let u = self.factor.solve(&free);
+        let stated = symmetric(&(free.transpose() * &u));
+        stated * factor + quadratic(excess, &self.layout, &u)
+    }
+
+    /// Linear functions of the unknowns that are estimated.
+    fn free(&self, rows: &Mat<f64>, ties: &[PoseResponse]) -> Mat<f64> {
         let n_knots = 6 * self.layout.n_controls;
         let mut free = Mat::<f64>::zeros(self.layout.len(), rows.ncols());
         for j in 0..rows.ncols() {
@@ -165,9 +187,7 @@ impl Factorized {
                 *entry = globals[g] + tied.map(|(tie, knot)| tie[g] * knot).sum::<f64>();
             }
         }
-        let joint = free.transpose() * self.factor.solve(&free);
-        let n = joint.nrows();
-        DMatrix::from_fn(n, n, |i, j| 0.5 * (joint[(i, j)] + joint[(j, i)]))
+        free
     }
 
     /// What the system says of the global states, and how the control points go with them.
@@ -225,6 +245,11 @@ impl Factorized {
         }
         responses
     }
+}
+
+fn symmetric(matrix: &Mat<f64>) -> DMatrix<f64> {
+    let n = matrix.nrows();
+    DMatrix::from_fn(n, n, |i, j| 0.5 * (matrix[(i, j)] + matrix[(j, i)]))
 }
 
 #[cfg(test)]

@@ -17,6 +17,7 @@ from bentwing.closing.global_registration.fixed import fixed_piece
 from bentwing.closing.global_registration.matching import MatchingPlan
 from bentwing.closing.global_registration.outcome import closed_estimate, improved, record_of
 from bentwing.closing.global_registration.settings import GlobalSettings
+from bentwing.closing.global_registration.shown_noise import shown_noise
 from bentwing.closing.global_registration.stretches import (
     Inertial,
     Stretches,
@@ -173,7 +174,12 @@ def register_jointly(
                 _cautious([r.payload for r in recorded]),
                 max(interval_of(e) for e in estimates),
             ),
-            plan=MatchingPlan(settings.n_visits, settings.min_overlap, HELD),
+            plan=MatchingPlan(
+                settings.n_visits,
+                settings.min_overlap,
+                HELD,
+                settings.posterior_interval_for(budget.seconds),
+            ),
             threads=threads or 0,
         )
     except EstimationError as error:
@@ -231,6 +237,7 @@ def _piece(stretches: Stretches, recorded: Recorded) -> _core.Piece:
         information=prior.information,
         offset=prior.offset,
         frozen=prior.frozen.tolist(),
+        shown_noise=shown_noise(estimate) if used else ([], []),
     )
 
 

@@ -9,16 +9,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bentwing.base import geometry
-from bentwing.base.covariances import PoseCovariances
+from bentwing.base.covariances import PoseCovariances, short_pairs
 from bentwing.base.trajectory import Trajectory
 from bentwing.closing.global_registration.stretches import interval_of
-from bentwing.odometry.continuous.drift import USUAL_DISPERSION, with_heading
 from bentwing.odometry.continuous.slow_states import named_std
 from bentwing.odometry.core_states import refined
 from bentwing.odometry.segments import joined
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+
+    from numpy.typing import NDArray
 
     from bentwing import _core
     from bentwing.base.estimate import Estimate
@@ -75,39 +76,44 @@ def closed_estimate(
         refined(estimate.calibration, slow),
         std={**estimate.calibration.std, **named_std(covariance, frozen)},
     )
+    poses = _poses_of(found, moved, own)
     return replace(
         estimate,
         trajectory=joined(moved, dt),
         calibration=calibration,
-        covariances=_covariances(found, moved, own, _inertial_inflation(estimate)),
+        covariances=PoseCovariances.joined(poses),
+        short_variances=_short_variances(found, moved, poses, own),
     )
 
 
-def _covariances(
-    found: _core.GlobalRegistration,
-    segments: Sequence[Trajectory],
-    own: slice,
-    inflation: float,
-) -> PoseCovariances | None:
-    """Return those of poses evenly along the segments, as uncertain as residuals say they are."""
-    inflation = max(inflation, found.dispersion / USUAL_DISPERSION)
+def _poses_of(
+    found: _core.GlobalRegistration, segments: Sequence[Trajectory], own: slice
+) -> list[PoseCovariances]:
+    """Return the covariances of poses evenly along the segments."""
     seconds = sum(float(s.times[-1] - s.times[0]) for s in segments)
     interval = max(POSE_INTERVAL, seconds / MOST_POSES)
     parts = []
     for piece, segment in enumerate(segments, start=own.start):
         first, last = float(segment.times[0]), float(segment.times[-1])
         times = np.linspace(first, last, 1 + max(1, round((last - first) / interval)))
-        parts.append(
-            PoseCovariances(times, with_heading(found.pose_covariances(piece, times.tolist())))
-        )
-    return PoseCovariances.joined([p.scaled(inflation) for p in parts])
+        parts.append(PoseCovariances(times, found.pose_covariances(piece, times.tolist())))
+    return parts
 
 
-def _inertial_inflation(estimate: Estimate) -> float:
-    """How much larger than stated the noise of the IMU is, by the windows' residuals; at least one."""
-    rms = [[r for r in (w.gyro_rms, w.accel_rms) if r is not None] for w in estimate.windows]
-    worst = [max(r) ** 2 for r in rms if r]
-    return max(1.0, float(np.median(worst))) if worst else 1.0
+def _short_variances(
+    found: _core.GlobalRegistration,
+    segments: Sequence[Trajectory],
+    poses: Sequence[PoseCovariances],
+    own: slice,
+) -> NDArray[np.float64] | None:
+    """Return the mean variances (6,) of poses as seen from those ten metres before."""
+    variances = []
+    for piece, (segment, part) in enumerate(zip(segments, poses, strict=True), start=own.start):
+        pairs = part.times[short_pairs(part.times, segment.interpolate(part.times)[0])]
+        matrices = found.relative_covariances(piece, pairs.tolist())
+        variances.append(np.einsum("kii->ki", matrices))
+    joined_ones = np.concatenate(variances)
+    return joined_ones.mean(axis=0) if len(joined_ones) else None
 
 
 def record_of(
@@ -138,6 +144,7 @@ def record_of(
         "iterations": [dict(zip(names, i, strict=True)) for i in found.iterations],
         "inlier_share": found.fit[0],
         "residual_rms": found.fit[1],
+        "dispersion": found.dispersion,
         "largest_translation": float(max(shifts)),
         "largest_rotation": float(max(turns)),
         "timings": timings,

@@ -61,6 +61,13 @@ class GlobalSettings(Settings):
         """
         return max(self.knot_interval, seconds / self.max_knots)
 
+    def posterior_interval_for(self, seconds: float) -> float:
+        """Return the interval, s, of the knots by which covariances of the poses are computed.
+
+        As that of the windows, as long as there are not too many.
+        """
+        return max(RegistrationSettings().knot_interval, seconds / self.max_knots)
+
     def registration(self, seconds: float) -> RegistrationSettings:
         """Return the settings of the core's rows and iterations for a length in s."""
         return RegistrationSettings(

@@ -75,7 +75,7 @@ class OdometryPass:
         self._views = FixedViews(settings)
         self._finished: list[FinalPoses] = []
         self._end = samples.end
-        self._drift = Drift()
+        self._drift = Drift(settings.n_views)
         self.covariance = np.zeros((N_STATES, N_STATES))
         self.timings = {"propagate": 0.0, "surfels": 0.0, "register": 0.0}
         self._finish()  # a rest may have been long
@@ -128,6 +128,10 @@ class OdometryPass:
     def covariances(self, trajectory: Trajectory) -> PoseCovariances:
         """Return those of some poses of what `trajectory` has returned."""
         return self._drift.covariances(trajectory, self._first_position)
+
+    def short_covariances(self, trajectory: Trajectory) -> NDArray[np.float64]:
+        """Return those (M, 6, 6) of poses as seen from the ones ten metres before."""
+        return self._drift.short_covariances(trajectory)
 
     def recent(self) -> Trajectory:
         """Return the end of the trajectory, levelled."""

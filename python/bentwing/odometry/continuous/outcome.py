@@ -21,8 +21,11 @@ from bentwing.odometry.segments import joined
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from numpy.typing import NDArray
+
     from bentwing.base.breaks import Break
     from bentwing.base.calibration import Calibration
+    from bentwing.base.trajectory import Trajectory
     from bentwing.base.window_record import WindowRecord
     from bentwing.odometry.continuous.odometry_pass import OdometryPass
 
@@ -73,7 +76,17 @@ def estimate_of(
         covariances=PoseCovariances.joined(
             [p.covariances(s) for p, s in zip(passes, segments, strict=True)]
         ),
+        short_variances=_short_variances(passes, segments),
     )
+
+
+def _short_variances(
+    passes: Sequence[OdometryPass], segments: Sequence[Trajectory]
+) -> NDArray[np.float64] | None:
+    """Return the mean variances (6,) of poses as seen from those ten metres before."""
+    parts = [p.short_covariances(s) for p, s in zip(passes, segments, strict=True)]
+    variances = np.einsum("kii->ki", np.concatenate(parts))
+    return variances.mean(axis=0) if len(variances) else None
 
 
 def _since(windows: Sequence[WindowRecord], first_turn: float, gap: float) -> float:

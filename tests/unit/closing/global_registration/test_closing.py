@@ -86,6 +86,15 @@ def test_a_slow_drift_is_taken_out(closed):
     assert not closed.warnings
 
 
+def test_over_ten_metres_a_pose_is_no_less_certain_than_since_the_start_and_once_more(closed):
+    """Laps of six metres: what lies ten metres back was seen again, and errors do not add up."""
+    found = closed.estimate
+    whole = np.einsum("kii->ki", found.covariances.matrices)
+    assert (whole[1:, 3:] > 0.0).all()
+    assert (found.short_variances > 0.0).all()
+    assert (found.short_variances[3:] < 4.0 * whole[:, 3:].max()).all()
+
+
 def test_the_result_does_not_depend_on_threads(closed):
     again = close_loops(estimate(bent(truth())), scans(), PAYLOAD, threads=1)
     assert np.array_equal(again.estimate.trajectory.positions, closed.estimate.trajectory.positions)

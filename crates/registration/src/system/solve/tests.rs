@@ -30,6 +30,25 @@ fn dense_and_sparse_solutions_agree() {
     }
 }
 
+/// `H⁻¹ H H⁻¹` is `H⁻¹`, whatever the rows.
+#[test]
+fn rows_that_err_twice_as_much_double_the_covariance() {
+    let equations = equations(12);
+    let mut frozen = [false; N_GLOBALS];
+    frozen[7] = true;
+    let system = Solver::default().factorize(&equations, 0, &frozen).unwrap();
+    let n = 6 * 12 + N_GLOBALS;
+    let rows = Mat::from_fn(n, 3, |i, j| ((3 * i + 7 * j) as f64).sin());
+    let stated = system.covariance_of(&rows, &[]);
+    let mut less = equations.clone();
+    less.take_away(0.25, &equations);
+    for (factor, excess, expected) in [(1.0, &equations, 2.0), (0.5, &less, 1.25)] {
+        let found = system.sandwich_of(&rows, factor, excess);
+        let difference = found - &stated * expected;
+        assert!(difference.norm() < 1e-9 * stated.norm(), "{difference}");
+    }
+}
+
 #[test]
 fn an_unknown_without_information_is_named() {
     let mut equations = NormalEquations::new(1);

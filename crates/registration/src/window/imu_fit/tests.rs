@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 
 use super::*;
+use crate::constraints::shown_noise::ShownNoise;
 use crate::constraints::testing::settings;
 use crate::{NormalEquations, RowGroup, Solver};
 use bentwing_trajectory::{InertialUnit, extend_inertial, so3};
@@ -101,7 +102,15 @@ fn fit(fault: &Fault, deviation: [f64; 2], random: &mut Random) -> ImuFit {
     };
     let spline = CorrectionSpline::covering(0.0, trajectory.end(), settings().knot_interval);
     let mut equations = NormalEquations::new(spline.n_controls());
-    imu::add(&mut equations, &trajectory, &imu, &globals, &spline, &NOISE);
+    imu::add(
+        &mut equations,
+        &trajectory,
+        &imu,
+        &globals,
+        &spline,
+        &NOISE,
+        &ShownNoise::default(),
+    );
     for n in (0..trajectory.len()).step_by(10) {
         let [turn, shift] = deviation;
         let (p, R, _) = truth(trajectory.time(n));

@@ -69,8 +69,8 @@ def expected_accuracy(
     short = estimate.short_variances
     if short is None:
         short = min(1.0, SHORT / max(_path(estimate), 1e-9)) * whole
-    of_poses = float(np.sqrt(short[3:].mean()))
-    thickness = float(np.hypot(range_sigma, of_poses)) if walls is None else walls.median
+    shifted = float(np.sqrt(short[3:].mean()))
+    thickness = float(np.hypot(range_sigma, shifted)) if walls is None else walls.median
     return ExpectedAccuracy(*_radii(whole), *_radii(short), map_thickness=thickness)
 
 

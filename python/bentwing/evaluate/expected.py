@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bentwing.base.estimate import Estimate
-    from bentwing.evaluate.map import Thickness
+    from bentwing.evaluate.revisits import Revisits
 
 # Within this many standard deviations lie 68 % of the errors in a plane.
 _IN_A_PLANE = 1.51
@@ -30,8 +30,8 @@ class ExpectedAccuracy:
     heading : rad, of the least certain pose
     horizontal_per_10m, vertical_per_10m, heading_per_10m : of a pose as seen from the one ten metres of
         path before, in the mean
-    map_thickness : m, standard deviation of points across flat surfaces of the map, as measured over
-        all visits; without any of the ranges' noise and of the poses over ten metres
+    map_thickness : m, standard deviation of points across the surfaces of the map: of the ranges' noise,
+        and of how far apart two visits have seen the same; without any of the poses over ten metres
     """
 
     horizontal: float
@@ -53,14 +53,14 @@ class ExpectedAccuracy:
 
 
 def expected_accuracy(
-    estimate: Estimate, range_sigma: float, walls: Thickness | None = None
+    estimate: Estimate, range_sigma: float, revisits: Revisits | None = None
 ) -> ExpectedAccuracy | None:
     """Return what to expect of an estimate and the map it makes; None where it has no covariances.
 
     Parameters
     ----------
     range_sigma : m, noise of the lidar's ranges
-    walls : how thick flat surfaces are in the map, if there are any
+    revisits : how far surfaces that were seen twice lie apart in the map, if any were
     """
     covariances = estimate.covariances
     if covariances is None or not len(covariances.times):
@@ -69,8 +69,10 @@ def expected_accuracy(
     short = estimate.short_variances
     if short is None:
         short = min(1.0, SHORT / max(_path(estimate), 1e-9)) * whole
-    shifted = float(np.sqrt(short[3:].mean()))
-    thickness = float(np.hypot(range_sigma, shifted)) if walls is None else walls.median
+    # Each of two visits has an error of its own, so that the variance of their distance is that of both.
+    apart = np.sqrt(2.0 * short[3:].mean()) if revisits is None else revisits.std
+    # Rays meet surfaces at all angles: across them one half of the noise's variance is left in the mean.
+    thickness = float(np.sqrt(0.5 * (range_sigma**2 + apart**2)))
     return ExpectedAccuracy(*_radii(whole), *_radii(short), map_thickness=thickness)
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from bentwing.base.atomic import write_text
 from bentwing.evaluate.expected import ExpectedAccuracy
+from bentwing.evaluate.map import wall_thickness
 from bentwing.report import sections
 from bentwing.report.calibration import calibration_table
 from bentwing.report.coverage import draw_coverage
@@ -28,7 +29,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bentwing.base.trajectory import Trajectory
-    from bentwing.evaluate.map import Thickness
     from bentwing.evaluate.revisits import Revisits
 
 Spin = tuple["NDArray[np.float64]", "NDArray[np.float64]"]
@@ -41,7 +41,6 @@ def write_report(
     trajectory: Trajectory,
     map_sample: tuple[NDArray[np.float64], NDArray[np.float64]],
     revisits: Revisits | None = None,
-    walls: Thickness | None = None,
     spin: Spin | None = None,
 ) -> None:
     """Write the report of a run.
@@ -53,7 +52,6 @@ def write_report(
     trajectory : of the IMU in the map; may be empty after a failure
     map_sample : points (N, 3) m in the map and their times (N,) s; may be empty
     revisits : how well what was seen twice agrees in the map
-    walls : how thick flat surfaces are in the map
     spin : times (M,) s and rate of turn (M,) rad/s of the sensor head
     """
     points, times = map_sample
@@ -66,7 +64,7 @@ def write_report(
         merging_section(run_json.get("merging")),
         _georeference(run_json.get("georeference")),
         _coverage(points, times, run_json),
-        _accuracy(revisits, walls, run_json) if len(points) else "",
+        _accuracy(points, revisits, run_json),
         _motion(trajectory, spin),
         _windows(run_json.get("windows") or []),
         f"<h2>Calibration of the sensor head</h2>{_calibrations(run_json)}",
@@ -139,8 +137,16 @@ def _coverage(
     return f'<h2>Coverage</h2><div class="grid">{figures}</div>'
 
 
-def _accuracy(revisits: Revisits | None, walls: Thickness | None, record: Mapping[str, Any]) -> str:
+def _accuracy(
+    points: NDArray[np.float64], revisits: Revisits | None, record: Mapping[str, Any]
+) -> str:
     """Show how well the map agrees with itself: what is known without any reference."""
+    if not len(points):
+        return ""
+    try:
+        walls = wall_thickness(points)
+    except ValueError:
+        walls = None
     asked = bool((record.get("settings") or {}).get("loop_closure"))
     numbers = consistency_table(walls, revisits)
     closing = closing_table(record.get("loop_closure"), asked=asked)

@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from bentwing.closing.georeference.georeference import Georeferenced
     from bentwing.closing.localize import GivenCoordinates
     from bentwing.evaluate.expected import ExpectedAccuracy
-    from bentwing.evaluate.map import Thickness
     from bentwing.evaluate.revisits import Revisits
     from bentwing.evaluate.verdict import Evidence, Reason
     from bentwing.recording import Batch
@@ -82,7 +81,6 @@ class WrittenMap:
     record : how it was cleaned, for run.json
     sample : evenly chosen points, in the frame of the trajectory
     revisits : how well they agree that were seen twice, if any were
-    walls : how thick flat surfaces are in it, if there are any
     change : points that have appeared and disappeared since the prior map, for run.json
     """
 
@@ -91,7 +89,6 @@ class WrittenMap:
     record: dict[str, Any]
     sample: MapSample
     revisits: Revisits | None = None
-    walls: Thickness | None = None
     change: dict[str, int] | None = None
 
 

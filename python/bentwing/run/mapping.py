@@ -11,7 +11,6 @@ import numpy as np
 
 from bentwing.base.clock import NS_PER_S
 from bentwing.base.trajectory import Trajectory
-from bentwing.evaluate.map import wall_thickness
 from bentwing.evaluate.revisits import revisit_consistency
 from bentwing.map.chunk import untimed
 from bentwing.map.clean import clean
@@ -28,7 +27,6 @@ if TYPE_CHECKING:
 
     from bentwing.base.estimate import Estimate
     from bentwing.closing.localize import Difference
-    from bentwing.evaluate.map import Thickness
     from bentwing.map.chunk import MapChunk
     from bentwing.map.writer import MapWriter
     from bentwing.run.folder import RunFolder
@@ -100,22 +98,14 @@ def write_map(
     counts["map.written"] = writer.n_points
     points = sample.points
     revisits = revisit_consistency(points, sample.times) if len(points) else None
-    walls = _walls(points)
     if difference is None:
-        return WrittenMap(path, counts, record, sample, revisits, walls)
+        return WrittenMap(path, counts, record, sample, revisits)
     clouds = {"appeared": difference.appeared, "disappeared": difference.disappeared}
     for name, points in clouds.items():
         changed = folder.file(f"{name}.{settings.map_format}")
         with _open(changed, settings, origin_ns, placed) as writer:
             writer.write(untimed(_projected(points, placed)))
-    return WrittenMap(path, counts, record, sample, revisits, walls, difference.record)
-
-
-def _walls(points: NDArray[np.float64]) -> Thickness | None:
-    try:
-        return wall_thickness(points) if len(points) else None
-    except ValueError:  # no flat surface, as in a forest
-        return None
+    return WrittenMap(path, counts, record, sample, revisits, difference.record)
 
 
 def follow_each_other(estimates: Sequence[Estimate]) -> list[float]:

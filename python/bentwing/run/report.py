@@ -60,7 +60,6 @@ def _write(
         trajectory=trajectory,
         map_sample=(points, times),
         revisits=None if found.map is None else found.map.revisits,
-        walls=None if found.map is None else found.map.walls,
         spin=found.spin.series,
     )
     if len(points):

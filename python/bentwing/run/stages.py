@@ -160,7 +160,7 @@ def make_map(job: Job, found: Found) -> Found:
         )
     sigma = part.payload.lidar.range_sigma
     evidence = judge_revisits(written.revisits, sigma)
-    accuracy = expected_accuracy(estimate, sigma, written.walls)
+    accuracy = expected_accuracy(estimate, sigma, written.revisits)
     return replace(found, map=written, accuracy=accuracy, evidence=(*found.evidence, *evidence))
 
 

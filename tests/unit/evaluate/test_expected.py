@@ -10,7 +10,7 @@ from bentwing.base.estimate import Estimate
 from bentwing.base.mount import FixedMount, Pose
 from bentwing.base.trajectory import Trajectory
 from bentwing.evaluate.expected import expected_accuracy
-from bentwing.evaluate.map import Thickness
+from bentwing.evaluate.revisits import Revisits
 
 STD = np.array([1e-3, 1e-3, 2e-3, 0.02, 0.02, 0.01])
 
@@ -37,7 +37,7 @@ def test_the_least_certain_pose_speaks_for_the_whole_and_without_better_ten_metr
     assert found.vertical == pytest.approx(0.01)
     assert found.heading == pytest.approx(2e-3)
     assert found.vertical_per_10m == pytest.approx(0.005)
-    assert found.map_thickness > 0.01
+    assert 0.01 / np.sqrt(2.0) < found.map_thickness < 0.02
 
 
 def test_ten_metres_are_as_uncertain_as_the_estimate_says():
@@ -47,9 +47,12 @@ def test_ten_metres_are_as_uncertain_as_the_estimate_says():
     assert found.vertical == pytest.approx(0.01)
 
 
-def test_the_map_is_as_thick_as_its_walls_are_measured():
-    walls = Thickness(0.012, 0.01, 0.02, 0.03, np.zeros((1, 3)), np.array([0.012]))
-    assert expected_accuracy(estimated(40.0), 0.01, walls).map_thickness == 0.012
+def test_the_map_is_as_thick_as_ranges_and_visits_scatter():
+    none = np.empty(0)
+    visits = Revisits(0.024, 0.01, 0.05, 100, none, none, none)
+    found = expected_accuracy(estimated(40.0), 0.01, visits)
+    # 10 mm of noise at all angles are 7 mm across; visits that are 24 mm apart err by 17 mm each.
+    assert found.map_thickness == pytest.approx(np.hypot(0.01, 0.024) / np.sqrt(2.0))
 
 
 def test_of_a_short_path_ten_metres_are_the_whole():

@@ -71,7 +71,7 @@ mod tests {
     fn scatter(n: i32, patch: impl Fn(i32) -> i32, pull: impl Fn(i32) -> f64) -> f64 {
         let mut scatter = Scatter::new();
         for k in 0..n {
-            let place = (VoxelKey::new([patch(k), 0, 0]), 2);
+            let place = (VoxelKey::new([patch(k).into(), 0, 0]), 2);
             let pulls = Pulls::from([(place, [0.0, 0.0, 0.0, pull(k), 0.0, 0.0])]);
             scatter.add(pulls, [[0.0, 0.0, 0.0, 1.0, 0.0, 0.0]].into_iter());
         }

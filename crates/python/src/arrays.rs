@@ -2,7 +2,9 @@
 //! Checked views of `NumPy` arrays: shape, layout, finiteness and order of time.
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
-use numpy::{PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods, ToPyArray};
+use numpy::{
+    PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods, ToPyArray,
+};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -147,4 +149,9 @@ pub(crate) fn to_array2<'py, const D: usize>(
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     use numpy::PyArrayMethods;
     rows.as_flattened().to_pyarray(py).reshape([rows.len(), D])
+}
+
+/// A vector as an array (3,).
+pub(crate) fn vector<'py>(py: Python<'py>, v: &Vector3<f64>) -> Bound<'py, PyArray1<f64>> {
+    v.as_slice().to_pyarray(py)
 }

@@ -13,9 +13,10 @@ use pyo3::prelude::*;
 
 use crate::arrays::to_array2;
 use crate::errors::{detached, in_pool, solve_error};
+use crate::globals::Globals;
 use crate::registration::{RegistrationSettings, global_matrix};
 use crate::surfels::Surfels;
-use crate::trajectory::{Globals, Imu, Samples};
+use crate::trajectory::{Imu, Samples};
 
 #[derive(FromPyObject)]
 pub(crate) struct MatchingPlan {

@@ -12,6 +12,7 @@ mod arrays;
 mod cells;
 mod errors;
 mod global;
+mod globals;
 mod kalman;
 mod laz;
 mod ndt;
@@ -31,6 +32,8 @@ mod _core {
     #[pymodule_export]
     use crate::global::{GlobalRegistration, Piece, register_globally};
     #[pymodule_export]
+    use crate::globals::Globals;
+    #[pymodule_export]
     use crate::kalman::{KalmanFilter, KalmanSweep};
     #[pymodule_export]
     use crate::laz::LazCompressor;
@@ -45,7 +48,7 @@ mod _core {
     #[pymodule_export]
     use crate::surfels::{Surfels, extract_surfels};
     #[pymodule_export]
-    use crate::trajectory::{Globals, Imu, Samples};
+    use crate::trajectory::{Imu, Samples};
 
     #[pymodule_init]
     fn init(m: &Bound<'_, PyModule>) -> PyResult<()> {

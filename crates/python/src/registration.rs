@@ -13,8 +13,9 @@ use pyo3::prelude::*;
 
 use crate::arrays::{finite_rows, to_array2};
 use crate::errors::{detached, in_pool, solve_error};
+use crate::globals::Globals;
 use crate::surfels::Surfels;
-use crate::trajectory::{Globals, Imu, Samples};
+use crate::trajectory::{Imu, Samples};
 
 #[derive(FromPyObject)]
 pub(crate) struct RegistrationSettings {

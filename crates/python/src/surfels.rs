@@ -15,7 +15,8 @@ use crate::arrays::{
     angles as angles_of, finite, finite_number, finite_rows, times, to_array2, vectors,
 };
 use crate::errors::in_pool;
-use crate::trajectory::{Globals, Samples};
+use crate::globals::Globals;
+use crate::trajectory::Samples;
 
 #[derive(FromPyObject)]
 pub(crate) struct SurfelSettings {

@@ -64,7 +64,12 @@ def judge_calibration(found: Calibration, payload: Payload) -> list[Evidence]:
 
 
 def judge_clocks(windows: Sequence[WindowRecord]) -> list[Evidence]:
-    """Judge by how fast the latency walks, in a straight line, seconds a second."""
+    """Judge by how fast the latency changes, in a straight line, seconds a second.
+
+    It is the whole latency at the time of each window: what the rate of the lidar's clock makes of it
+    and what its walk adds. The estimator follows clocks as far apart as crystals are; that is no
+    fault. Where they are further apart the stamps are wrong, however well the map fits.
+    """
     known = [(w.time, w.latency) for w in windows if w.latency is not None]
     if len(known) < 4 or known[-1][0] - known[0][0] < _SHORTEST:
         return []

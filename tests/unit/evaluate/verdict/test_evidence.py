@@ -231,9 +231,16 @@ def test_a_mount_far_from_the_payload_is_doubted():
     assert "the direction of the lidar" in found.reasons[0].sentence
 
 
-def test_clocks_that_run_apart_are_doubted():
-    windows = [replace(w, latency=5e-4 * w.time) for w in estimate().windows]
+@pytest.mark.parametrize("rate", [-0.01, -5e-4, 5e-4, 0.01])
+def test_clocks_that_run_apart_further_than_crystals_are_doubted(rate):
+    windows = [replace(w, latency=0.004 + rate * w.time) for w in estimate().windows]
     assert kinds(estimate(windows=windows), watched()) == {"clocks"}
+
+
+@pytest.mark.parametrize("rate", [-1e-4, 1e-4])
+def test_clocks_that_run_apart_as_crystals_do_are_no_fault(rate):
+    windows = [replace(w, latency=0.004 + rate * w.time) for w in estimate().windows]
+    assert kinds(estimate(windows=windows), watched()) == set()
 
 
 def test_a_plane_that_never_turns_makes_a_slice():

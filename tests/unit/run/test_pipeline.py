@@ -5,6 +5,7 @@ import pickle
 from collections import Counter
 from contextlib import suppress
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 import pytest
@@ -39,6 +40,7 @@ class FakeRecording:
     warnings = ("/imu: a gap of 0.2 s",)
     clock = Clock(ORIGIN_NS)
     has_fixes = False
+    clocks = MappingProxyType({})
 
     def __init__(self, paths, payload, *, strict):
         del payload, strict
@@ -95,7 +97,7 @@ class FakeEstimator:
 def recording(tmp_path, monkeypatch):
     monkeypatch.setattr(head, "Recording", FakeRecording)
     monkeypatch.setattr(head, "judge", lambda *_, **__: Judgement([], [], None, 1.0))
-    monkeypatch.setattr(head, "find_set_up", lambda _, payload, __: SetUp(payload))
+    monkeypatch.setattr(head, "find_set_up", lambda _, payload, *__, **___: SetUp(payload))
     monkeypatch.setattr(odometry, "create", lambda *_: FakeEstimator(), raising=False)
     (tmp_path / "yard.mcap").write_bytes(b"recording")
     return [tmp_path / "yard.mcap"]

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 # With a gyro that is off by half a step a description is still promising.
 GYRO_STEP, GYRO_STEPS, FURTHER = 0.06, 14, 7
-RANGE_STEPS, FINE = (0.1, 0.03), 0.03
+RANGE_STEP, RANGE_STEPS, FINE = 0.1, 5, 0.03
 SMALL = 0.04  # what is less the estimator corrects, or is no mistake of a unit
 SUSPICIOUS = 2.0  # times their noise; forces that are so far off may have a cause
 CLEARLY = 0.5  # of what forces are off; a scale that leaves more explains nothing
@@ -61,12 +61,14 @@ def require_scale_of_ranges(tried: Tried) -> None:
     ------
     DefectError
     """
-    if not tried(1.0).is_promising or (off := _force(tried(1.0))) < SUSPICIOUS:
+    off = _force(tried(1.0))
+    if not SUSPICIOUS <= off < np.inf:
         return
-    best, least = 1.0, off
-    for step in RANGE_STEPS:
-        best, least = _best(best, step, lambda scale: _force(tried(scale)), least)
-    if least > CLEARLY * off or abs(np.log(best)) < SMALL:
+    # A scale that is far off may end in another solution, so that the way down is not even.
+    scales = np.exp(RANGE_STEP * np.arange(-RANGE_STEPS, RANGE_STEPS + 1)).tolist()
+    least, best = min((_force(tried(scale)), scale) for scale in scales)
+    best, least = _best(best, FINE, lambda scale: _force(tried(scale)), least)
+    if least > CLEARLY * off or abs(np.log(best)) < SMALL or not tried(best).is_promising:
         return
     msg = (
         f"the lidar's ranges are about {best:.2f} times as long as the accelerometer says that it has "

@@ -254,6 +254,8 @@ def _frozen_names(frozen: Iterable[str], *, has_imu: bool, has_motor: bool) -> s
     if unknown:
         msg = f"frozen: unknown states {sorted(unknown)}; choose from {list(SLICES)}"
         raise UsageError(msg)
+    if "latency" in names:
+        names.add("latency_rate")  # a latency that is known is known at all times
     if not has_imu:
         names |= SLICES.keys() - set(MOTOR_STATES)
     if not has_motor:

@@ -35,15 +35,39 @@ class SmoothAngles:
         self._times = np.zeros(0)
         self._angles = np.zeros(0)
         self._n_given = 0  # of those that are kept
+        self._n_seen = 0
 
     def add(self, batch: EncoderBatch) -> EncoderBatch | None:
-        """Take the next angles; return those that need not wait for others."""
-        self._times = np.concatenate([self._times, batch.times])
-        self._angles = np.concatenate([self._angles, batch.angles])
-        self._measure()
-        given = batch if self._noise == 0.0 else self._smoothed(len(self._times) - self._half)
+        """Take the next angles; return those that need not wait for others.
+
+        The noise is measured after every `ENOUGH` angles, in whatever pieces they come.
+        """
+        parts: list[EncoderBatch] = []
+        first = 0
+        while first < len(batch.times):
+            last = min(first + ENOUGH - self._n_seen % ENOUGH, len(batch.times))
+            part = EncoderBatch(batch.times[first:last], batch.angles[first:last])
+            if (given := self._take(part)) is not None:
+                parts.append(given)
+            first = last
+        if len(parts) < 2:
+            return parts[0] if parts else None
+        return EncoderBatch(
+            np.concatenate([part.times for part in parts]),
+            np.concatenate([part.angles for part in parts]),
+        )
+
+    def _take(self, part: EncoderBatch) -> EncoderBatch | None:
+        self._times = np.concatenate([self._times, part.times])
+        self._angles = np.concatenate([self._angles, part.angles])
+        self._n_seen += len(part.times)
+        given: EncoderBatch | None = part
         if self._noise == 0.0:
             self._n_given = len(self._times)
+        else:
+            given = self._smoothed(len(self._times) - self._half)
+        if self._n_seen % ENOUGH == 0:
+            self._measure()
         self._forget()
         return given
 
@@ -53,11 +77,10 @@ class SmoothAngles:
 
     def _measure(self) -> None:
         """Measure the noise: fourth differences know nothing of a smooth motion, and 70 times its variance."""
-        if len(self._times) < ENOUGH:
-            return
-        step = float(np.median(np.diff(self._times)))
+        times, angles = self._times[-ENOUGH:], self._angles[-ENOUGH:]
+        step = float(np.median(np.diff(times)))
         half = min(MOST_HALF, int(REACH / step)) if step > 0 else 0
-        left = np.diff(self._angles, 4)
+        left = np.diff(angles, 4)
         noise = 1.4826 * float(np.median(np.abs(left))) / np.sqrt(70.0)
         if half >= FEWEST_HALF and noise > COARSE:
             self._noise, self._half = max(noise, self._noise), half

@@ -45,6 +45,16 @@ def test_stamps_that_jitter_are_noise_of_the_angles():
     assert np.std((found - motion(times))[later]) < 0.6 * np.std((read - motion(times))[later])
 
 
+@pytest.mark.parametrize("size", [1, 7, 64, 333])
+def test_pieces_of_any_size_become_the_same_to_the_bit(size):
+    times = np.arange(0.0, 3.0, 1 / RATE_HZ)
+    read = np.round(motion(times) / STEP) * STEP
+    at, found = smoothed(times, read, size)
+    known_at, known = smoothed(times, read)
+    assert np.array_equal(at, known_at)
+    assert np.array_equal(found, known)
+
+
 @pytest.mark.parametrize("sigma", [0.0, 2e-4])
 def test_fine_angles_stay_as_they_are_to_the_bit(sigma):
     times = np.arange(0.0, 5.0, 1 / RATE_HZ)

@@ -117,6 +117,17 @@ class PoseCovariances(Value):
         return cls((stamps_ns - clock_origin_ns) / NS_PER_S, matrices)
 
 
+def positive_part(matrices: Array) -> Array:
+    """Return covariances (K, 6, 6) without negative variances, as those of differences and of rounding."""
+    values, vectors = np.linalg.eigh(matrices)
+    positive = (vectors * np.maximum(values, 0.0)[:, None, :]) @ vectors.transpose(0, 2, 1)
+    # Beside a variance that is huge the smallest ones are rounding again.
+    axes = np.arange(6)
+    positive[:, axes, axes] = np.maximum(positive[:, axes, axes], 0.0)
+    has_negative = (values.min(axis=1) < 0.0) | (matrices[:, axes, axes].min(axis=1) < 0.0)
+    return np.asarray(np.where(has_negative[:, None, None], positive, matrices))
+
+
 def short_pairs(times: Array, positions: Array) -> NDArray[np.intp]:
     """Return pairs (M, 2) of poses between which the path is ten metres long, or next above that.
 

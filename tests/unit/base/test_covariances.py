@@ -4,7 +4,7 @@ import pytest
 
 from bentwing import InputError
 from bentwing.base import geometry
-from bentwing.base.covariances import PoseCovariances, carried, short_pairs
+from bentwing.base.covariances import PoseCovariances, carried, positive_part, short_pairs
 
 ORIGIN_NS = 1_600_000_000_123_456_789
 
@@ -80,3 +80,14 @@ def test_pairs_are_ten_metres_of_path_apart_and_not_of_distance():
     assert pairs[0].tolist() == [0, 5]
     assert pairs[-1].tolist() == [6, 11]
     assert short_pairs(times[:5], positions[:5]).shape == (0, 2)
+
+
+def test_variances_are_not_negative_and_others_keep_their_bits():
+    sound = np.diag([1.0, 2.0, 3.0, 4.0, 5.0, 6.0])
+    unsound = sound.copy()
+    unsound[3, 3] = -0.5
+    unsound[3, 4] = unsound[4, 3] = 0.1
+    first, second = positive_part(np.array([sound, unsound]))
+    assert np.array_equal(first, sound)
+    assert np.linalg.eigvalsh(second).min() > -1e-12
+    assert second[3, 3] >= 0.0

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bentwing.base import geometry
-from bentwing.base.covariances import PoseCovariances, short_pairs
+from bentwing.base.covariances import PoseCovariances, positive_part, short_pairs
 from bentwing.base.trajectory import Trajectory
 from bentwing.closing.global_registration.stretches import interval_of
 from bentwing.odometry.continuous.slow_states import named_std
@@ -96,17 +96,9 @@ def _poses_of(
     for piece, segment in enumerate(segments, start=own.start):
         first, last = float(segment.times[0]), float(segment.times[-1])
         times = np.linspace(first, last, 1 + max(1, round((last - first) / interval)))
-        matrices = _positive(found.pose_covariances(piece, times.tolist()))
+        matrices = positive_part(found.pose_covariances(piece, times.tolist()))
         parts.append(PoseCovariances(times, matrices))
     return parts
-
-
-def _positive(matrices: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return covariances (K, 6, 6) without the negative variances of rounding, where little is seen."""
-    values, vectors = np.linalg.eigh(matrices)
-    positive = (vectors * np.maximum(values, 0.0)[:, None, :]) @ vectors.transpose(0, 2, 1)
-    has_negative = values.min(axis=1) < 0.0
-    return np.asarray(np.where(has_negative[:, None, None], positive, matrices))
 
 
 def _short_variances(
@@ -119,7 +111,7 @@ def _short_variances(
     variances = []
     for piece, (segment, part) in enumerate(zip(segments, poses, strict=True), start=own.start):
         pairs = part.times[short_pairs(part.times, segment.interpolate(part.times)[0])]
-        matrices = _positive(found.relative_covariances(piece, pairs.tolist()))
+        matrices = positive_part(found.relative_covariances(piece, pairs.tolist()))
         variances.append(np.einsum("kii->ki", matrices))
     joined_ones = np.concatenate(variances)
     return joined_ones.mean(axis=0) if len(joined_ones) else None

@@ -12,6 +12,7 @@ from bentwing.base.covariances import (
     PoseCovariances,
     carried,
     levelled_covariances,
+    positive_part,
     short_pairs,
 )
 from bentwing.odometry.continuous.slow_states import SLICES
@@ -101,7 +102,7 @@ class Drift:
             drifted.matrices[last] - carried(without_tilt(drifted.matrices[first]), apart)
             for (first, last), apart in zip(pairs.tolist(), away, strict=True)
         ]
-        matrices = np.array(since).reshape(-1, 6, 6)
+        matrices = positive_part(np.array(since).reshape(-1, 6, 6))
         return levelled_covariances(matrices, away, self._gravity_std)
 
     def _drifted(self, trajectory: Trajectory) -> PoseCovariances:

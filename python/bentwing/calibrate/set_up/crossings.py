@@ -17,6 +17,7 @@ from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
 from bentwing.base import geometry
+from bentwing.calibrate.set_up.axes import angle_between
 from bentwing.calibrate.set_up.rotations import spread
 from bentwing.calibrate.set_up.scans import attitudes, beams
 from bentwing.recording.batches import ImuBatch
@@ -43,12 +44,10 @@ class Reading:
     ----------
     delay : s, lidar stamps minus IMU clock
     hand : 1, or -1 where all rates are negated
-    scale : what the gyro shows of a turn
     """
 
     delay: float = 0.0
     hand: int = 1
-    scale: float = 1.0
 
 
 class Crossings:
@@ -98,7 +97,7 @@ class Crossings:
         refined = self._best(reading, COARSE, REFINED)
         found: list[tuple[float, NDArray[np.float64]]] = []
         for misfit, R in refined:
-            if all(_angle(R, other) > APART for _, other in found):
+            if all(angle_between(R, other) > APART for _, other in found):
                 found.append((misfit, R))
         return found
 
@@ -130,7 +129,7 @@ class Crossings:
         return float(best.fun), turned(best.x)
 
     def _attitudes_by(self, reading: Reading) -> NDArray[np.float64]:
-        rates = reading.hand / reading.scale * self._imu.gyro
+        rates = reading.hand * self._imu.gyro
         quats = attitudes(ImuBatch(self._imu.times, rates, self._imu.accel))
         times = self._scans.times - reading.delay
         nearest = np.clip(np.searchsorted(self._imu.times, times), 0, len(quats) - 1)
@@ -139,7 +138,3 @@ class Crossings:
 
 def _first(pair: tuple[float, NDArray[np.float64]]) -> float:
     return pair[0]
-
-
-def _angle(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
-    return float(np.arccos(np.clip((np.trace(a.T @ b) - 1.0) / 2.0, -1.0, 1.0)))

@@ -168,7 +168,8 @@ class Found:
         return {
             "counts": counts,
             "clocks": self.reading.clocks,
-            "verdict": self.verdict,
+            # Of a recording that was refused nothing is there that could be good.
+            "verdict": None if estimate is None and written is None else self.verdict,
             "set_up": [] if self.set_up is None else self.set_up.findings,
             "warnings": self.warnings,
             "notes": [] if estimate is None else estimate.notes,

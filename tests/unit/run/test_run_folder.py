@@ -168,3 +168,8 @@ def test_plain_makes_json_of_what_runs_hold(tmp_path):
     assert result["a"] == [1.0, None]
     assert result["2"] == [3, str(tmp_path)]
     json.dumps(result, allow_nan=False)
+
+
+def test_nothing_is_called_good_before_there_is_an_estimate():
+    assert Found().to_json()["verdict"] is None
+    assert Found(estimate()).to_json()["verdict"].state == "good"

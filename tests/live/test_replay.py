@@ -77,8 +77,12 @@ def test_predicted_poses_are_near_the_final_ones(flown, quick):
     turned = geometry.multiply(
         geometry.inverse(quats), np.array([p.quat_xyzw for p in poses])[known]
     )
-    # In its first second of turning the scale of a gyro is known to a few thousandths of some rad.
-    assert np.abs(geometry.log(turned)).max() < 0.02
+    errors = np.abs(geometry.log(turned)).max(axis=1)
+    # In the first seconds of a spin the scale of a consumer's gyro is known to 0.5 % only, which is
+    # 0.013 rad in the half second that is predicted; frozen, it would be 0.002 from the start.
+    assert errors.max() < 0.02
+    settled = times[known] > times[known][0] + 3.0
+    assert errors[settled].max() < 0.005
 
 
 def test_predicted_velocities_are_near_the_true_ones(flown, flight):

@@ -6,7 +6,9 @@ from __future__ import annotations
 import numpy as np
 
 from bentwing.base.trajectory import Trajectory, read_tum
+from bentwing.evaluate.simulated import score
 from bentwing.evaluate.trajectory import absolute_error
+from bentwing.run.pipeline import map_recording
 
 SCENE, DURATION = "office", 22.0
 GAP = (0.6 * DURATION, 0.6 * DURATION + 1.5)  # s
@@ -58,3 +60,13 @@ def test_a_start_in_motion_still_gives_a_map(flown):
     assert flight.score.ate_flight < 0.005
     assert abs(flight.score.latency) < 1e-3
     assert flight.record["counts"]["map.points"] > 100_000
+
+
+def test_a_recording_that_begins_in_motion_is_as_accurate(simulated, tmp_path):
+    """A head that nods when the recording begins: nothing is known of the IMU but what is described."""
+    folder = simulated("courtyard", DURATION, head="hokuyo-nod")
+    run = tmp_path / "run"
+    map_recording(folder / "recording.bag", folder / "payload.yaml", run, start=8.0)
+    found = score(folder, run)
+    assert found.ate < 0.005
+    assert found.map_ratio < 1.2

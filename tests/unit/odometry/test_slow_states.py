@@ -15,6 +15,7 @@ from bentwing.odometry.continuous.slow_states import (
     UNIT_STATES,
     SlowStatePrior,
     at_epoch,
+    initial_std,
 )
 from bentwing.odometry.start import attitude_of
 from bentwing.recording.sections.imu import Imu
@@ -105,6 +106,19 @@ def test_the_bias_and_the_mount_are_less_certain_by_what_the_unit_adds_to_them()
     assert std[SLICES["extrinsic_rotation"]] == pytest.approx(
         np.hypot(INITIAL_STD["extrinsic_rotation"], usual["gyro_misalignment"])
     )
+
+
+def test_a_unit_is_taken_as_ideal_where_the_start_is_in_motion():
+    imu = Imu(kind="consumer")
+    moving, resting = (
+        SlowStatePrior(imu, has_motor=False, moving=moving, frozen=()) for moving in (True, False)
+    )
+    for name in UNIT_STATES:
+        assert moving.frozen[SLICES[name]].all()
+        assert not resting.frozen[SLICES[name]].any()
+    # Nor are the others less certain for it.
+    known = np.sqrt(1.0 / np.diag(moving.information))
+    assert known[SLICES["accel_bias"]] == pytest.approx(initial_std(moving=True)["accel_bias"])
 
 
 def test_without_an_imu_its_states_are_frozen():

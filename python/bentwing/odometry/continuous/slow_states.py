@@ -113,7 +113,9 @@ class SlowStatePrior:
         stated: Stated = MappingProxyType({}),
     ) -> None:
         std = initial_std(moving=moving, stated=stated) | dict.fromkeys(UNIT_STATES, 0.0)
-        if imu is not None:
+        # A start in motion has no force at rest that a unit's errors could be told from, and until the
+        # first windows have settled they would take up whatever is wrong.
+        if imu is not None and not moving:
             std |= _with_unit(std, imu.errors_expected)
         frozen = {*frozen, *(name for name in UNIT_STATES if std[name] == 0.0)}
         names = _frozen_names(frozen, has_imu=imu is not None, has_motor=has_motor)

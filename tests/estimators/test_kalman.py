@@ -102,7 +102,7 @@ def test_a_delay_that_is_not_learned_turns_the_motor_the_other_way(turned):
     """Together with the turn of the mount it leaves the lidar where it is, at the rate of then."""
     engine, *_ = turned
     described = described_calibration(engine._payload)
-    state = first_state(find_start(IMU_AT_REST, engine._imu), described)
+    state = first_state(find_start(IMU_AT_REST, engine._imu, 0.0), described)
     covariance = unlearned_delay(6.0, described.mount, state)
     std = np.sqrt(np.diag(covariance))
     assert std[ENCODER_DELAY] == pytest.approx([3e-3])

@@ -26,7 +26,7 @@ _log = get_logger(__name__)
 
 # A start in motion takes its first attitude from the mean force over this time, s: long enough
 # for the accelerations of a flight to average out.
-MOVING_MEAN = 1.0
+MOVING_MEAN = 2.0
 # Its first turn is that of the gyro's samples of this time, s.
 FIRST_RATE = 0.02
 # A motion may begin too softly to be noticed: the last part of a rest is estimated, not held, s.
@@ -64,8 +64,14 @@ def level_start(time: float) -> Start:
     return Start(None, level, nothing, nothing, nothing, InertialUnit(), time)
 
 
-def find_start(imu: ImuBatch, noise: Imu) -> Start:
-    """Return the start of a recording with an IMU, from its first seconds."""
+def find_start(imu: ImuBatch, noise: Imu, first: float) -> Start:
+    """Return the start of a recording with an IMU, from its first seconds.
+
+    Parameters
+    ----------
+    imu : at least two samples
+    first : s, of the first pose
+    """
     static = find_static_start(
         imu.times,
         imu.gyro,
@@ -77,13 +83,7 @@ def find_start(imu: ImuBatch, noise: Imu) -> Start:
         _log.info(
             "no rest within the first %.1f s: the estimate begins in motion", np.ptp(imu.times)
         )
-        first = imu.times < imu.times[0] + MOVING_MEAN
-        up = imu.accel[first].mean(axis=0)
-        rate = imu.gyro[imu.times < imu.times[0] + FIRST_RATE].mean(axis=0)
-        unit = _unit(imu, up)
-        return Start(
-            None, attitude_of(up), rate, np.zeros(3), np.zeros(3), unit, float(imu.times[0])
-        )
+        return _moving_start(imu, first)
     _log.info("the estimate begins after a rest from %.2f to %.2f s", static.start, static.end)
     # Only the part of the bias along gravity shows at rest; the rest is in the attitude.
     force = static.accel_mean
@@ -91,6 +91,27 @@ def find_start(imu: ImuBatch, noise: Imu) -> Start:
     hold = max(static.start, static.end - LATE_HOLD)
     unit = _unit(imu, force)
     return Start(static, attitude_of(force), np.zeros(3), static.gyro_bias, bias, unit, hold)
+
+
+def _moving_start(imu: ImuBatch, first: float) -> Start:
+    """Return a start at `first`, s, whose up is the mean force of the time behind it."""
+    begin = min(int(np.searchsorted(imu.times, first)), len(imu.times) - 1)
+    end = max(begin + 1, int(np.searchsorted(imu.times, first + MOVING_MEAN)))
+    times, gyro, accel = imu.times[begin:end], imu.gyro[begin:end], imu.accel[begin:end]
+    # A head that nods turns the IMU to all sides within the mean.
+    up = geometry.rotate(_turns(times, gyro), accel).mean(axis=0)
+    rate = gyro[times < times[0] + FIRST_RATE].mean(axis=0)
+    nothing = np.zeros(3)
+    return Start(None, attitude_of(up), rate, nothing, nothing, _unit(imu, up), float(imu.times[0]))
+
+
+def _turns(times: NDArray[np.float64], gyro: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Quaternions (N, 4) of the turns since the first of `times`, from rates (N, 3) by trapezoids."""
+    steps = geometry.exp(0.5 * np.diff(times)[:, None] * (gyro[1:] + gyro[:-1]))
+    turns = [np.array([0.0, 0.0, 0.0, 1.0])]
+    for step in steps:
+        turns.append(geometry.multiply(turns[-1], step))
+    return np.array(turns)
 
 
 def _unit(imu: ImuBatch, force: NDArray[np.float64]) -> InertialUnit:

@@ -67,12 +67,13 @@ def find_beginning(
         return None
     if imu is None or payload.imu is None:
         return Beginning(level_start(lidar[0]), lidar[0], settings.without_imu(), imu is not None)
-    start = find_start(buffer.imu(imu[0], imu[1] + 1.0), payload.imu)
+    # The trajectory begins with the later of both sensors.
+    first = max(lidar[0], imu[0] + 2 * DT)
+    start = find_start(buffer.imu(imu[0], imu[1] + 1.0), payload.imu, first)
     still_resting = start.static is not None and start.hold >= imu[1] - 1.0
     if still_resting and not finishing:
         return None
-    # The trajectory begins with the later of both sensors.
-    return Beginning(start, max(lidar[0], imu[0] + 2 * DT), settings, has_imu=True)
+    return Beginning(start, first, settings, has_imu=True)
 
 
 def begin_pass(

@@ -188,7 +188,7 @@ class Kalman(Estimator):
         if len(seen.times) < 2:
             return False
         first = max(lidar, imu[0] + 2 * DT)
-        start, mount = find_start(seen, self._imu), self._taken_mount(first)
+        start, mount = find_start(seen, self._imu, first), self._taken_mount(first)
         beginning = described_beginning(first, start, self._payload, mount)
         if self._before:
             beginning = self._before[-1].continued(beginning)

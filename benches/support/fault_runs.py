@@ -16,6 +16,7 @@ from bentwing.base.errors import InputError
 from bentwing.evaluate.simulated import Truth, WorldError, world_error
 from bentwing.simulate import Scenario, simulate
 from bentwing.simulate.faults import FAULTS, with_fault
+from bentwing.simulate.faults.clocks import CAUSE as CLOCK
 
 NO_PAYLOAD = 1.3
 """Without a payload the path may be so many times as far off as with it."""
@@ -132,7 +133,7 @@ def _error(truth: Truth, run: Path, fault: str | None) -> WorldError | None:
     """Compare a run with the truth; None where it ended before there was a map."""
     if not (run / "map.laz").exists():
         return None
-    moves_clock = fault is not None and FAULTS[fault].repair == "latency"
+    moves_clock = fault is not None and FAULTS[fault].cause == CLOCK
     try:
         return world_error(truth, run, any_clock=moves_clock)
     except InputError:

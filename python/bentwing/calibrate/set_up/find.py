@@ -13,7 +13,7 @@ from bentwing.calibrate.set_up.errors import DefectError, NotFoundError
 from bentwing.calibrate.set_up.motor import UNITS, describe_motor, zero_between
 from bentwing.calibrate.set_up.noise import ImuNoise, states_noise
 from bentwing.calibrate.set_up.planar import describe_by_trials
-from bentwing.calibrate.set_up.refine import refined
+from bentwing.calibrate.set_up.refine import Refinement
 from bentwing.calibrate.set_up.set_up import SetUp
 from bentwing.calibrate.set_up.signals import Averages
 from bentwing.calibrate.set_up.spatial import describe_by_motion, followed
@@ -101,10 +101,13 @@ class _Search:
         if not self._has_mount and not states_noise(start):
             start = ImuNoise.of(imu).at_least_in(start)
         if is_plane(points[:: max(1, len(points) // LOOKED_AT)]):
-            found, stretch = self._by_trials(start), self._stretch
-        else:
-            found, stretch = self._by_motion(start, self._imu)
-        return refined(stretch, found, has_mount=self._has_mount, threads=self._threads)
+            return self._by_trials(start)
+        found, stretch = self._by_motion(start, self._imu)
+        refinement = Refinement(stretch, found, has_mount=self._has_mount, threads=self._threads)
+        refinement.require_scale_of_ranges()
+        if (held := refinement.found()) is None:
+            raise NotFoundError(refinement.trial.sentence)
+        return held
 
     def _by_trials(self, start: Payload) -> Payload:
         given = self._given if self._has_mount else None

@@ -92,6 +92,7 @@ def describe_by_trials(
     others = itertools.chain(descriptions.of_mounts(), delayed[LIKELY:])
     if found := _first(trials.at_a_glance(other) for other in others):
         return found
+    trials.require_scale_in_what_was_refused()
     if given is not None:
         trials.require_scale_of_gyro(given)
     raise NotFoundError(trials.failure)

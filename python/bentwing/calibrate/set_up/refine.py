@@ -8,11 +8,9 @@ from typing import TYPE_CHECKING
 
 from bentwing.base.mount import FixedMount
 from bentwing.calibrate.set_up import edits
-from bentwing.calibrate.set_up.errors import NotFoundError
 from bentwing.calibrate.set_up.noise import ImuNoise
 from bentwing.calibrate.set_up.scales import require_scale_of_ranges
-from bentwing.calibrate.set_up.trial import try_payload
-from bentwing.calibrate.set_up.trials import richest
+from bentwing.calibrate.set_up.trial import richest, try_payload
 from bentwing.recording.sections.section import Transform
 
 if TYPE_CHECKING:
@@ -28,40 +26,63 @@ REFINED = 12.0  # s
 CAUTION = 2.0  # what a short stretch says of a mount is less certain than it seems
 
 
-def refined(stretch: Stretch, payload: Payload, *, has_mount: bool, threads: int | None) -> Payload:
-    """Return the payload with latency and mount as the estimator finds them, starting from it.
+class Refinement:
+    """A set-up that was found, over a longer time, with the estimator free to correct it.
 
-    Raises
-    ------
-    NotFoundError
-        What is seen does not fit together with it.
+    Parameters
+    ----------
+    payload : with the set-up that was found
+    has_mount : whether the shift of the lidar on the IMU is described
     """
-    wide = edits.with_std(payload, latency=FOUND_LATENCY, extrinsic_rotation=FOUND_ROTATION)
-    if not has_mount:
-        wide = edits.with_std(wide, extrinsic_translation=UNKNOWN_SHIFT)
-    read = stretch.read_as(wide)
-    wide = ImuNoise.of(read.imu).at_least_in(wide)
-    span = richest(read.imu, REFINED)
 
-    @cache
-    def tried(scale: float) -> Trial:
-        scaled = edits.with_lidar(wide, range_scale=wide.lidar.range_scale / scale)
-        return try_payload(stretch.read_as(scaled).part(*span), scaled, threads)
+    def __init__(
+        self, stretch: Stretch, payload: Payload, *, has_mount: bool, threads: int | None
+    ) -> None:
+        wide = edits.with_std(payload, latency=FOUND_LATENCY, extrinsic_rotation=FOUND_ROTATION)
+        if not has_mount:
+            wide = edits.with_std(wide, extrinsic_translation=UNKNOWN_SHIFT)
+        read = stretch.read_as(wide)
+        self._payload, self._has_mount = payload, has_mount
+        self._stretch, self._threads = stretch, threads
+        self._wide = ImuNoise.of(read.imu).at_least_in(wide)
+        self._span = richest(read.imu, REFINED)
+        self._tried = cache(self._tried_with)
 
-    trial = tried(1.0)
-    require_scale_of_ranges(tried)
-    if not trial.is_consistent or trial.calibration is None:
-        raise NotFoundError(trial.sentence)
-    mount = trial.calibration.mount
-    found = edits.with_latency(payload, trial.calibration.source_latency)
-    if not has_mount:
-        # What little was seen leaves of it is still to be found.
-        found = edits.with_std(found, **_std(trial.calibration))
-    if isinstance(mount, FixedMount):
-        return found.model_copy(update={"T_imu_lidar": _transform(mount.T_imu_lidar)})
-    return edits.with_encoder(
-        found, T_imu_motor=_transform(mount.T_imu_motor), zero=mount.encoder_zero
-    )
+    @property
+    def trial(self) -> Trial:
+        """What the estimator makes of it."""
+        return self._tried(1.0)
+
+    def require_scale_of_ranges(self) -> None:
+        """Refuse ranges with a wrong scale.
+
+        Raises
+        ------
+        DefectError
+        """
+        require_scale_of_ranges(self._tried)
+
+    def found(self) -> Payload | None:
+        """Return the payload with latency and mount as the estimator finds them; None if it does not hold."""
+        trial = self.trial
+        if not trial.is_consistent or trial.calibration is None:
+            return None
+        mount = trial.calibration.mount
+        found = edits.with_latency(self._payload, trial.calibration.source_latency)
+        if not self._has_mount:
+            # What little was seen leaves of it is still to be found.
+            found = edits.with_std(found, **_std(trial.calibration))
+        if isinstance(mount, FixedMount):
+            return found.model_copy(update={"T_imu_lidar": _transform(mount.T_imu_lidar)})
+        return edits.with_encoder(
+            found, T_imu_motor=_transform(mount.T_imu_motor), zero=mount.encoder_zero
+        )
+
+    def _tried_with(self, scale: float) -> Trial:
+        lidar = self._wide.lidar
+        scaled = edits.with_lidar(self._wide, range_scale=lidar.range_scale / scale)
+        part = self._stretch.read_as(scaled).part(*self._span)
+        return try_payload(part, scaled, self._threads)
 
 
 def _std(found: Calibration) -> dict[str, float]:

@@ -6,6 +6,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from bentwing.base.errors import BentwingError
 from bentwing.odometry.continuous.estimator import Continuous
 from bentwing.odometry.continuous.settings import ContinuousSettings, RegistrationSettings
@@ -14,7 +16,7 @@ if TYPE_CHECKING:
     from bentwing.base.calibration import Calibration
     from bentwing.base.window_record import WindowRecord
     from bentwing.calibrate.set_up.stretch import Stretch
-    from bentwing.recording import Payload
+    from bentwing.recording import ImuBatch, Payload
 
 # Of a right description 0.97 of the matches and more agree, of a wrong one at most 0.92.
 # In a glance a right description is a little blurred by where it came from.
@@ -80,12 +82,18 @@ class Trial:
     @property
     def sentence(self) -> str:
         """Say how badly it fits."""
+        best = "in the mount and with the axes that fit best"
         share = None if self.last is None else self.last.inlier_share
+        if share and share >= LEAST_INLIERS:
+            return (
+                f"the surfaces that the lidar has seen twice agree, but {best} the accelerometer feels "
+                "another motion than they show: check the axes of the IMU and the lidar's ranges"
+            )
         agree = "none of" if not share else f"only {share:.0%} of"
         return (
-            f"{agree} the surfaces that the lidar has seen twice agree, in the mount and with the axes "
-            "that fit best: check that the IMU is on the lidar's head, works and was recorded with "
-            "it, and the lidar's ranges and the times of its points"
+            f"{agree} the surfaces that the lidar has seen twice agree, {best}: check that the IMU is on "
+            "the lidar's head, works and was recorded with it, and the lidar's ranges and the times of "
+            "its points"
         )
 
 
@@ -99,3 +107,13 @@ def try_payload(stretch: Stretch, payload: Payload, threads: int | None = None) 
     except BentwingError:
         return Trial(payload)
     return Trial(payload, found.windows[-1] if found.windows else None, found.calibration)
+
+
+def richest(imu: ImuBatch, length: float) -> tuple[float, float]:
+    """Return start and end, s, of the part in which the head turns most."""
+    steps = np.linalg.norm(imu.gyro[1:], axis=1) * np.diff(imu.times)
+    turned = np.concatenate([[0.0], np.cumsum(steps)])
+    starts = np.arange(imu.times[0], max(imu.times[-1] - length, imu.times[0]) + 0.1, 0.5)
+    ahead = np.interp(starts + length, imu.times, turned) - np.interp(starts, imu.times, turned)
+    start = float(starts[int(np.argmax(ahead))])
+    return start, start + length

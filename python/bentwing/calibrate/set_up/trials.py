@@ -6,18 +6,17 @@ from __future__ import annotations
 from functools import cache
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from bentwing.base.mount import FixedMount
 from bentwing.calibrate.set_up import edits
+from bentwing.calibrate.set_up.refine import Refinement
 from bentwing.calibrate.set_up.scales import require_scale_of_gyro, require_scale_of_ranges
-from bentwing.calibrate.set_up.trial import try_payload
+from bentwing.calibrate.set_up.trial import richest, try_payload
 
 if TYPE_CHECKING:
     from bentwing.calibrate.set_up.noise import ImuNoise
     from bentwing.calibrate.set_up.stretch import Stretch
     from bentwing.calibrate.set_up.trial import Trial
-    from bentwing.recording import ImuBatch, Payload
+    from bentwing.recording import Payload
 
 TRIED, GLANCE = 6.0, 3.0  # s of the richest motion on which descriptions are tried, and first seen
 AS_DESCRIBED = 0.02  # rad, std of a rotation that may hold
@@ -40,6 +39,7 @@ class Trials:
         self._stretch, self._noise, self._threads = stretch, noise, threads
         self._has_mount = has_mount
         self._best: Trial | None = None
+        self._refused: list[Refinement] = []
 
     def as_described(self, payload: Payload) -> Payload | None:
         """Return what a description has become if all fits together with it and it hardly changes."""
@@ -58,7 +58,7 @@ class Trials:
         again = self._tried(self._learned(payload, glance), CLOSE, TRIED)
         if again.is_promising and not again.is_consistent:
             again = self._tried(self._learned(payload, again), CLOSE, TRIED)
-        return self._learned(payload, again) if again.is_consistent else None
+        return self._refined(payload, again)
 
     def require_scale_of_gyro(self, payload: Payload) -> None:
         """Refuse a gyro with a wrong scale, where only that contradicts a description.
@@ -87,6 +87,16 @@ class Trials:
 
         require_scale_of_ranges(tried)
 
+    def require_scale_in_what_was_refused(self) -> None:
+        """Refuse ranges with a wrong scale, where only that contradicts the best of what was tried for long.
+
+        Raises
+        ------
+        DefectError
+        """
+        if self._refused:
+            max(self._refused, key=lambda r: r.trial.score).require_scale_of_ranges()
+
     def _with_gyro(self, scale: float) -> Trials:
         stretch = self._stretch.with_gyro_scaled(1.0 / scale)
         return Trials(stretch, self._noise, has_mount=self._has_mount, threads=self._threads)
@@ -97,8 +107,25 @@ class Trials:
         return "nothing that can be seen" if self._best is None else self._best.sentence
 
     def _consistent(self, payload: Payload, rotation: float) -> Payload | None:
-        trial = self._tried(payload, rotation, TRIED)
-        return self._learned(payload, trial) if trial.is_consistent else None
+        return self._refined(payload, self._tried(payload, rotation, TRIED))
+
+    def _refined(self, payload: Payload, trial: Trial) -> Payload | None:
+        """Return what a consistent trial has told, if it holds for longer as well."""
+        if not trial.is_consistent:
+            return None
+        refinement = Refinement(
+            self._stretch,
+            self._learned(payload, trial),
+            has_mount=self._has_mount,
+            threads=self._threads,
+        )
+        self._note(refinement.trial)
+        found = refinement.found()
+        if found is None:
+            self._refused.append(refinement)
+        else:
+            refinement.require_scale_of_ranges()
+        return found
 
     def _learned(self, payload: Payload, trial: Trial) -> Payload:
         """Return a payload with the delay and what a trial has told of the mount."""
@@ -120,16 +147,9 @@ class Trials:
         read = self._stretch.read_as(wide)
         start, _ = richest(read.imu, TRIED)
         trial = try_payload(read.part(start, start + length), wide, self._threads)
-        if self._best is None or trial.score > self._best.score:
-            self._best = trial
+        self._note(trial)
         return trial
 
-
-def richest(imu: ImuBatch, length: float) -> tuple[float, float]:
-    """Return start and end, s, of the part in which the head turns most."""
-    steps = np.linalg.norm(imu.gyro[1:], axis=1) * np.diff(imu.times)
-    turned = np.concatenate([[0.0], np.cumsum(steps)])
-    starts = np.arange(imu.times[0], max(imu.times[-1] - length, imu.times[0]) + 0.1, 0.5)
-    ahead = np.interp(starts + length, imu.times, turned) - np.interp(starts, imu.times, turned)
-    start = float(starts[int(np.argmax(ahead))])
-    return start, start + length
+    def _note(self, trial: Trial) -> None:
+        if self._best is None or trial.score > self._best.score:
+            self._best = trial

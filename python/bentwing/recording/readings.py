@@ -14,6 +14,7 @@ import numpy as np
 
 from bentwing.base.calibration import STANDARD_GRAVITY
 from bentwing.base.clock import to_ns
+from bentwing.recording.beam_reading import BeamReading
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -73,25 +74,29 @@ class LidarReading:
     ----------
     range_scale : m per unit of the recording
     is_mirrored : y is negated
+    beams : what is added to each return by its beam, if anything is
     offset_ns : added to the stamps
     """
 
     range_scale: float = 1.0
     is_mirrored: bool = False
+    beams: BeamReading | None = None
     offset_ns: int = 0
 
     @classmethod
     def of(cls, lidar: Lidar) -> LidarReading:
         """Return the reading that the payload describes."""
-        return cls(lidar.range_scale, lidar.mirrored, -to_ns(lidar.latency_read))
+        beams = None if lidar.beams is None else BeamReading(lidar.beams)
+        return cls(lidar.range_scale, lidar.mirrored, beams, -to_ns(lidar.latency_read))
 
     def batch(self, batch: LidarBatch) -> LidarBatch:
         """Return a batch with its points in m, lidar frame."""
-        points = self.points(batch.points)
+        points = self._in_metres(batch.points)
+        if self.beams is not None:
+            points = self.beams.points(points, batch.ring)
         return batch if points is batch.points else replace(batch, points=points)
 
-    def points(self, points: Array) -> Array:
-        """Return points (N, 3), m, lidar frame."""
+    def _in_metres(self, points: Array) -> Array:
         scales = np.full(3, self.range_scale)
         if self.is_mirrored:
             scales[1] *= -1.0

@@ -13,6 +13,7 @@ from bentwing.base.atomic import write_text
 from bentwing.evaluate.expected import ExpectedAccuracy
 from bentwing.evaluate.map import wall_thickness
 from bentwing.report import sections
+from bentwing.report.beams import beams_section
 from bentwing.report.calibration import calibration_table
 from bentwing.report.coverage import draw_coverage
 from bentwing.report.loops import closing_table, consistency_table, revisits_table
@@ -68,6 +69,7 @@ def write_report(
         _motion(trajectory, spin),
         _windows(run_json.get("windows") or []),
         f"<h2>Calibration of the sensor head</h2>{_calibrations(run_json)}",
+        beams_section(run_json.get("beams")),
         _record(run_json),
     ]
     style = files("bentwing.report").joinpath("style.css").read_text(encoding="utf-8")

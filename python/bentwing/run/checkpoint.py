@@ -24,6 +24,7 @@ from bentwing.base.plain import plain
 from bentwing.base.trajectory import Trajectory
 from bentwing.base.window_record import WindowRecord
 from bentwing.calibrate.set_up import SetUp
+from bentwing.closing.beams import FoundBeams
 from bentwing.evaluate.verdict import Evidence
 from bentwing.run.found import Found, Reading, Spin
 
@@ -79,6 +80,7 @@ class Checkpoint:
             "stage_warnings": found.stage_warnings,
             "evidence": found.evidence,
             "set_up": None if found.set_up is None else found.set_up.to_json(),
+            "beams": found.beams,
             "timings": record.timings,
             "files": [name for name in record.files if name != NAME],
         }
@@ -169,4 +171,5 @@ def _found(arrays: dict[str, Any], described: dict[str, Any]) -> Found:
         stage_warnings=tuple(described["stage_warnings"]),
         evidence=tuple(Evidence.from_json(one) for one in described.get("evidence") or []),
         set_up=SetUp.from_json(described["set_up"]) if described.get("set_up") else None,
+        beams=FoundBeams.from_json(described["beams"]) if described.get("beams") else None,
     )

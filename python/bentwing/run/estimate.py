@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from bentwing import odometry
 from bentwing.base.errors import EstimationError, RecordingError
 from bentwing.evaluate.verdict import Evidence
+from bentwing.run.beams import find_in_run, read_by
 from bentwing.run.first_pass import FirstPass, blames_head
 
 if TYPE_CHECKING:
@@ -20,6 +21,21 @@ if TYPE_CHECKING:
 
 
 def estimate(job: Job, found: Found, head: Head) -> tuple[Job, Found]:
+    """Estimate, and once more where the first estimate shows that the lidar's beams are off.
+
+    Parameters, returns and errors are those of `_with_set_up`.
+    """
+    job, first = _with_set_up(job, found, head)
+    beams = find_in_run(job, first)
+    if beams is None:
+        return job, first
+    job.progress.note(beams.sentence())
+    job = read_by(job, head, beams)
+    before = replace(found, set_up=first.set_up, beams=beams)
+    return job, _first_pass(job, before, may_stop=False)
+
+
+def _with_set_up(job: Job, found: Found, head: Head) -> tuple[Job, Found]:
     """Estimate with the payload, and if that is contradicted with the set-up that the recording shows.
 
     Parameters

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from bentwing.base.estimate import Estimate
     from bentwing.calibrate.set_up import SetUp
+    from bentwing.closing.beams import FoundBeams
     from bentwing.closing.georeference.georeference import Georeferenced
     from bentwing.closing.localize import GivenCoordinates
     from bentwing.evaluate.expected import ExpectedAccuracy
@@ -110,6 +111,7 @@ class Found:
     evidence : by which the result is judged
     judged : of a merged map, what speaks against the runs in it
     set_up : the head as the recording shows it, where that is other than the payload says
+    beams : by how much the lidar's beams are off, where that was found; it is taken out
     doubt : why the estimate was stopped before its end
     failure : why the last stage did not finish
     """
@@ -128,6 +130,7 @@ class Found:
     evidence: tuple[Evidence, ...] = ()
     judged: tuple[Reason, ...] = ()
     set_up: SetUp | None = None
+    beams: FoundBeams | None = None
     doubt: Verdict | None = None
     failure: BaseException | None = None
 
@@ -170,6 +173,7 @@ class Found:
             "clocks": self.reading.clocks,
             # Of a recording that was refused nothing is there that could be good.
             "verdict": None if estimate is None and written is None else self.verdict,
+            "beams": self.beams,
             "set_up": [] if self.set_up is None else self.set_up.findings,
             "warnings": self.warnings,
             "notes": [] if estimate is None else estimate.notes,

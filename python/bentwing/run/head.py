@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from bentwing.base.progress import Progress
     from bentwing.calibrate.set_up import SetUp
+    from bentwing.closing.beams import FoundBeams
     from bentwing.run.settings import RunSettings
 
 _ALL_THE_SAME = "to map it all the same, give --force"
@@ -112,11 +113,18 @@ class Head:
     def use(self, set_up: SetUp) -> None:
         """Read the recording by a set-up that was found, and say what it is."""
         self.set_up = set_up
-        self._describe(set_up.payload)
-        self.recording.close()
-        self.recording = Recording(self.paths, self.settings.payload, strict=False)
+        self._read_by(set_up.payload)
         for finding in set_up.findings:
             self._progress.note(f"set-up: {finding.sentence} ({finding.line})")
+
+    def use_beams(self, beams: FoundBeams) -> None:
+        """Read the recording with its beams where they were found to be."""
+        self._read_by(beams.in_payload(self.settings.payload))
+
+    def _read_by(self, payload: Payload) -> None:
+        self._describe(payload)
+        self.recording.close()
+        self.recording = Recording(self.paths, payload, strict=False)
 
     @property
     def _moves(self) -> bool:

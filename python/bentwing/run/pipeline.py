@@ -12,6 +12,7 @@ from bentwing import odometry
 from bentwing.base.progress import as_progress
 from bentwing.closing.localize import read_prior_map
 from bentwing.run import stages
+from bentwing.run.beams import read_by
 from bentwing.run.check import opened
 from bentwing.run.checkpoint import Checkpoint
 from bentwing.run.choose import as_run_settings
@@ -141,6 +142,8 @@ def run_recording(
             if found.set_up is not None and found.set_up != head.set_up:
                 head.use(found.set_up)
                 job = replace(job, part=head.part, settings=head.settings)
+            if done is not None and found.beams is not None:
+                job = read_by(job, head, found.beams)
             if done is None:
                 job, found = estimate(job, found, head)
                 found = _keep(job, found, open_loop=True)

@@ -55,9 +55,9 @@ class InputOrder:
     ) -> LidarBatch:
         """Return returns of the lidar; with `overlaps` they may begin before the batch before ends."""
         stamps = self._times("point", LidarBatch, times, reading.offset_ns, overlaps=overlaps)
-        table = reading.points(_table("point", "points", points, stamps))
+        table = _table("point", "points", points, stamps)
         if rings is None:
-            return LidarBatch(table, stamps)
+            return reading.batch(LidarBatch(table, stamps))
         numbers = np.array(rings, dtype=np.float64, ndmin=1)
         if numbers.shape != stamps.shape:
             msg = f"{_named('point', stamps)}: rings: expected shape {stamps.shape}, got {numbers.shape}"
@@ -66,7 +66,7 @@ class InputOrder:
         if len(numbers) and not (numbers.min() >= 0 and numbers.max() < 2**16):
             msg = f"{_named('point', stamps)}: rings: expected 0 to 65535"
             raise ValueError(msg)
-        return LidarBatch(table, stamps, ring=numbers.astype(np.uint16))
+        return reading.batch(LidarBatch(table, stamps, ring=numbers.astype(np.uint16)))
 
     def encoder(
         self,

@@ -10,6 +10,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from bentwing.base.units import Unit
 from bentwing.recording.lidar_kinds import KIND_DEFAULTS, LidarKind, VelodyneModel
+from bentwing.recording.sections.beams import Beams
 from bentwing.recording.sections.section import NonNegative, Offset, Positive, Section, Topic
 
 # s; what is beyond is taken off the stamps when they are read. An estimator follows a latency from
@@ -31,6 +32,7 @@ class Lidar(Section):
     latency : s, its stamps minus the IMU's clock; estimators start from it
     mirrored : its scans run the other way: y of every point is negated
     range_scale : m per unit of the ranges in the recording; 0.001 for millimetres
+    beams : by how much each beam of a multi-beam lidar is off; None for not at all
     """
 
     topic: Topic | None = None
@@ -43,6 +45,7 @@ class Lidar(Section):
     latency: Offset = 0.0
     mirrored: bool = False
     range_scale: Annotated[Positive, Unit("m per unit of the recording")] = 1.0
+    beams: Beams | None = None
 
     @model_validator(mode="before")
     @classmethod

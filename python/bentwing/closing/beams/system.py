@@ -1,0 +1,201 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""One linear system of planes, poses and beams; the planes are eliminated."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import sparse
+
+from bentwing.base.value import Value
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from bentwing.closing.beams.cells import Cells
+    from bentwing.closing.beams.shots import Shots
+
+    Array = NDArray[np.float64]
+
+KNOT = 0.1
+"""s, between the knots of the poses' corrections, which are linear in between."""
+N_OFFSETS = 4
+"""Of a beam: elevation, azimuth, range, height."""
+SIGMAS = np.array([np.radians(0.3), np.radians(0.3), 0.02, 0.1])
+"""Prior of a beam: tables of a HDL-64 are off by up to 0.4°, its ranges by 10 to 30 mm."""
+LEAST_SIGMAS = np.array([np.radians(0.01), np.radians(0.01), 5e-4, 0.0])
+MEAN_SIGMAS = np.array([np.inf, 1e-5, np.inf, 1e-5])
+"""The same of their mean: a turn of all azimuths and a shift of all heights are those of the mount."""
+STEP_SIGMA = 5e-4
+"""m, of the heights of neighbours, save where a block of lasers ends and another one begins."""
+TURN_SIGMA, SHIFT_SIGMA = 0.006, 0.03
+"""rad and m, of what a correction departs from a steady one within a knot."""
+INDEPENDENT = 200
+"""Points of a cell that count as independent."""
+LEAST_SLOPE = 0.05
+"""Cosine between ray and normal below which a return says nothing of its own range."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Step(Value):
+    """Solution of a system.
+
+    Attributes
+    ----------
+    poses : (K, 6) `[δr, δt]` of the lidar at the knots, map frame
+    beams : (B, 4) elevation and azimuth, rad, range and height, m
+    covariance : (4 B, 4 B) of the beams
+    chi2 : mean squared error of the points before it, in units of their own deviations
+    """
+
+    poses: Array
+    beams: Array
+    covariance: Array
+    chi2: float
+
+
+def knots_of(times: Array) -> tuple[NDArray[np.intp], Array, int]:
+    """Return the knot before each time (N,), the share of the one behind it, and how many there are."""
+    at = (times - times[0]) / KNOT
+    before = at.astype(np.intp)
+    return before, at - before, int(before[-1]) + 2
+
+
+def solve(
+    shots: Shots, cells: Cells, beams: Array, sigmas: Array, range_sigma: float
+) -> Step:
+    """Move poses and beams so that the points of each cell lie in one plane.
+
+    Parameters
+    ----------
+    beams : (B, 4) what the beams were corrected by so far; the prior is about none
+    sigmas : (4,) standard deviations of the beams, as far as they are known
+    range_sigma : m, of a return
+    """
+    before, shares, n_knots = knots_of(shots.times)
+    n_poses, n_beams = 6 * n_knots, len(beams)
+    rows = _rows(shots, cells, before, shares, n_knots, n_beams)
+    sigma = np.maximum(range_sigma, cells.roughness)
+    counts = np.bincount(cells.cells, minlength=cells.n_cells)[cells.cells]
+    weights = np.minimum(1.0, INDEPENDENT / counts) / sigma**2
+    weights /= 1.0 + (cells.across / (2.0 * sigma)) ** 2
+    H, g = _without_planes(rows, weights, cells)
+    H += _steady(n_knots, H.shape[0])
+    prior = _prior(beams, sigmas)
+    H[n_poses:, n_poses:] += prior
+    g[n_poses:] += prior @ beams.ravel()
+    # The first pose stays.
+    H[range(6), range(6)] += 1e10
+    covariance = np.linalg.inv(H)
+    x = -covariance @ g
+    return Step(
+        x[:n_poses].reshape(n_knots, 6),
+        x[n_poses:].reshape(n_beams, N_OFFSETS),
+        covariance[n_poses:, n_poses:],
+        float((weights * cells.across**2).sum() / weights.sum() * (1 / range_sigma**2)),
+    )
+
+
+def _rows(
+    shots: Shots,
+    cells: Cells,
+    before: NDArray[np.intp],
+    shares: Array,
+    n_knots: int,
+    n_beams: int,
+) -> sparse.csr_matrix:
+    """Derivatives of `across` by all states.
+
+    Those by the beams are taken where the return would be in the plane. Taken where it is they would
+    hold its noise, and all would agree that a flatter world has less of it.
+    """
+    n, at = cells.normals, cells.chosen
+    rise, turn, ray, up = (slope[at] for slope in shots.slopes())
+    cosine = (n * ray).sum(axis=1)
+    seen = np.abs(cosine) > LEAST_SLOPE
+    in_plane = 1.0 - np.where(seen, cells.across / np.where(seen, cosine, 1.0), 0.0) / shots.ranges[at]
+    lever = shots.ranges[at, None] * ray
+    pose = np.hstack([np.cross(lever, n), n])
+    j, s = before[at], shares[at, None]
+    values = np.hstack(
+        [
+            (1.0 - s) * pose,
+            s * pose,
+            (in_plane * (n * rise).sum(axis=1))[:, None],
+            (in_plane * (n * turn).sum(axis=1))[:, None],
+            cosine[:, None],
+            (n * up).sum(axis=1)[:, None],
+        ]
+    )
+    poses = 6 * j[:, None] + np.arange(12)
+    beams = 6 * n_knots + N_OFFSETS * shots.rings[at, None] + np.arange(N_OFFSETS)
+    columns = np.hstack([poses, beams])
+    starts = np.arange(0, columns.size + 1, columns.shape[1])
+    shape = (len(at), 6 * n_knots + N_OFFSETS * n_beams)
+    return sparse.csr_matrix((values.ravel(), columns.ravel(), starts), shape=shape)
+
+
+def _without_planes(
+    rows: sparse.csr_matrix, weights: Array, cells: Cells
+) -> tuple[Array, Array]:
+    """Return the normal equations of poses and beams, height and slopes of each plane eliminated."""
+    n = len(weights)
+    planes = np.column_stack([np.ones(n), cells.along])
+    columns = 3 * cells.cells[:, None] + np.arange(3)
+    basis = sparse.csr_matrix(
+        (planes.ravel(), columns.ravel(), np.arange(0, 3 * n + 1, 3)), shape=(n, 3 * cells.n_cells)
+    )
+    products = weights[:, None, None] * planes[:, :, None] * planes[:, None, :]
+    order = np.argsort(cells.cells, kind="stable")
+    starts = np.searchsorted(cells.cells[order], np.arange(cells.n_cells))
+    own = np.add.reduceat(products[order], starts, axis=0)
+    inverse = sparse.block_diag(np.linalg.inv(own), format="csr")
+    weighted = rows.multiply(weights[:, None]).tocsr().T.tocsr()
+    mixed = (weighted @ basis).tocsr()
+    H = weighted @ rows - mixed @ (inverse @ mixed.T)
+    pulled = basis.T @ (weights * cells.across)
+    g = weighted @ cells.across - mixed @ (inverse @ pulled)
+    return np.asarray(H.todense()), np.asarray(g)
+
+
+def _prior(beams: Array, sigmas: Array) -> Array:
+    """Information on the beams: none is far off, and neighbours begin at one height.
+
+    The lasers of a block share a lens, blocks do not: few differences of the heights are large, and
+    those are believed, as by a Cauchy distribution.
+    """
+    n = len(beams)
+    information = np.diag(np.tile(sigmas**-2, n))
+    means = np.diag(MEAN_SIGMAS**-2) / n**2
+    information += np.kron(np.ones((n, n)), means)
+    difference = np.diff(np.eye(n), axis=0)
+    steps = (difference @ beams[:, 3]) / STEP_SIGMA
+    weights = STEP_SIGMA**-2 / (1.0 + steps**2)
+    information[3::N_OFFSETS, 3::N_OFFSETS] += difference.T @ (weights[:, None] * difference)
+    return information
+
+
+def shown_sigmas(beams: Array, covariance: Array) -> Array:
+    """Return how far beams (B, 4) are off in the mean: no farther than they show themselves to be.
+
+    What no motion shows, such as all elevations alike or in proportion, then stays as small as it is by
+    chance with so many beams.
+    """
+    variances = np.diag(covariance).reshape(beams.shape)
+    shown = np.sqrt((beams**2 + variances).mean(axis=0))
+    return np.append(np.clip(shown, LEAST_SIGMAS, SIGMAS)[:3], SIGMAS[3])
+
+
+def _steady(n_knots: int, size: int) -> Array:
+    """Information of second differences of the poses' corrections, which are hardly ever large."""
+    H = np.zeros((size, size))
+    difference = np.zeros((max(n_knots - 2, 0), n_knots))
+    for shift, value in enumerate((1.0, -2.0, 1.0)):
+        difference[np.arange(len(difference)), np.arange(len(difference)) + shift] = value
+    product = difference.T @ difference
+    for c in range(6):
+        sigma = TURN_SIGMA if c < 3 else SHIFT_SIGMA
+        H[c : 6 * n_knots : 6, c : 6 * n_knots : 6] = product / sigma**2
+    return H

@@ -102,6 +102,8 @@ def command(
         return
     found = run_recording(recording, out, chosen, payload, resume=resume, progress=progress)
     if write_payload is not None and found.estimate is not None:
-        payload_found = chosen.payload if found.beams is None else found.beams.in_payload(chosen.payload)
+        payload_found = (
+            chosen.payload if found.beams is None else found.beams.in_payload(chosen.payload)
+        )
         with_motion(payload_found, found.estimate.calibration).save(write_payload)
     say_run(out, found.verdict, quiet=quiet)

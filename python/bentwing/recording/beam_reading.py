@@ -25,9 +25,7 @@ def in_beams(points: Array) -> tuple[Array, Array, Array]:
     return np.hypot(flat, z), np.arctan2(z, flat), np.arctan2(y, x)
 
 
-def directed(
-    ranges: Array, elevations: Array, azimuths: Array, heights: Array | float
-) -> Array:
+def directed(ranges: Array, elevations: Array, azimuths: Array, heights: Array | float) -> Array:
     """Return points (N, 3), m, lidar frame, of rays that begin `heights` above its origin."""
     flat = ranges * np.cos(elevations)
     return np.column_stack(
@@ -61,16 +59,14 @@ class BeamReading:
         ranges, elevations, azimuths = in_beams(points)
         beam = self._beams_of(elevations, ring)
         found = self.beams
-        corrected = (
-            values + np.array(offsets)[beam] if offsets else values
-            for values, offsets in (
-                (ranges, found.ranges),
-                (elevations, found.elevations),
-                (azimuths, found.azimuths),
-            )
-        )
+        if found.ranges:
+            ranges = ranges + np.array(found.ranges)[beam]
+        if found.elevations:
+            elevations = elevations + np.array(found.elevations)[beam]
+        if found.azimuths:
+            azimuths = azimuths + np.array(found.azimuths)[beam]
         heights = np.array(found.heights)[beam] if found.heights else 0.0
-        return np.ascontiguousarray(directed(*corrected, heights))
+        return np.ascontiguousarray(directed(ranges, elevations, azimuths, heights))
 
     def _beams_of(self, elevations: Array, ring: NDArray[np.uint16] | None) -> NDArray[np.intp]:
         n = self.beams.n_beams

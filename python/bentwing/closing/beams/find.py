@@ -10,7 +10,7 @@ import numpy as np
 from bentwing.closing.beams.cells import find_cells
 from bentwing.closing.beams.found import FoundBeams
 from bentwing.closing.beams.shots import sample_shots
-from bentwing.closing.beams.system import N_OFFSETS, SIGMAS, knots_of, shown_sigmas, solve
+from bentwing.closing.beams.system import FIRST_SIGMAS, N_OFFSETS, knots_of, shown_sigmas, solve
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -29,15 +29,13 @@ SMALL = np.array([np.radians(0.005), np.radians(0.005), 5e-4, 5e-4])
 """A step of the beams that ends the iterations."""
 MEDIAN_IN_SIGMAS = 0.6745
 """Of the absolute value of a normal variable."""
+MAX_ANGLE = np.radians(1.0)
+"""A beam that seems farther off has been seen too little."""
 MIN_CELLS = 100
 """Planes without which nothing is said."""
-MIN_RETURNS = 100
-"""Returns of a beam without which nothing is said of it."""
 
 
-def find_beams(
-    estimate: Estimate, batches: Iterable[Batch], payload: Payload
-) -> FoundBeams | None:
+def find_beams(estimate: Estimate, batches: Iterable[Batch], payload: Payload) -> FoundBeams | None:
     """Find by how much the beams are off, together with the poses; None where nothing shows it.
 
     Parameters
@@ -48,7 +46,7 @@ def find_beams(
     first = sample_shots(batches, estimate, () if known is None else known.table)
     if first is None or first.n_beams < 2:
         return None
-    shots, beams, sigmas = first, np.zeros((first.n_beams, N_OFFSETS)), SIGMAS
+    shots, beams, sigmas = first, np.zeros((first.n_beams, N_OFFSETS)), FIRST_SIGMAS
     before, shares, _ = knots_of(first.times)
     behind = shares[:, None]
     for iteration in range(ITERATIONS[1]):
@@ -62,9 +60,9 @@ def find_beams(
         sigmas = shown_sigmas(beams, step.covariance)
         if iteration + 1 >= ITERATIONS[0] and (np.abs(step.beams) < SMALL).all():
             break
-    seen = np.bincount(shots.rings[cells.chosen], minlength=len(beams)) >= MIN_RETURNS
+    beams[(np.abs(beams[:, :2]) > MAX_ANGLE).any(axis=1), :3] = 0.0
     return FoundBeams(
-        np.where(seen[:, None], beams, 0.0),
+        beams,
         np.sqrt(np.diag(step.covariance)).reshape(beams.shape),
         _table(first),
         cells.n_cells,

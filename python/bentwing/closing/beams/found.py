@@ -84,7 +84,7 @@ class FoundBeams(Value):
     @classmethod
     def from_json(cls, described: Mapping[str, Any]) -> FoundBeams:
         """Read what JSON keeps of it."""
-        fields = {name: described[name] for name in ("n_planes", "n_returns")}
-        arrays = {name: np.array(described[name]) for name in ("offsets", "std", "table")}
+        offsets, std, table = (np.array(described[n]) for n in ("offsets", "std", "table"))
+        n_planes, n_returns = described["n_planes"], described["n_returns"]
         before, after = described["roughness"]
-        return cls(**arrays, **fields, roughness=(before, after))
+        return cls(offsets, std, table, n_planes, n_returns, (before, after))

@@ -62,12 +62,12 @@ class Shots(Value):
         return int(self.rings.max()) + 1
 
     def points(self) -> Array:
-        """Where they are (N, 3), m, map frame."""
+        """Return where they are (N, 3), m, map frame."""
         local = directed(self.ranges, self.elevations, self.azimuths, self.heights)
         return self.origins + self._turned(local)
 
     def slopes(self) -> tuple[Array, Array, Array, Array]:
-        """Derivatives (N, 3) of `points` by elevation, azimuth, range and height, map frame."""
+        """Return derivatives (N, 3) of `points` by elevation, azimuth, range and height, map frame."""
         flat = np.cos(self.elevations)
         rise, turn, ray = (
             directed(np.ones_like(flat), e, a, 0.0)

@@ -25,8 +25,10 @@ N_OFFSETS = 4
 """Of a beam: elevation, azimuth, range, height."""
 SIGMAS = np.array([np.radians(0.3), np.radians(0.3), 0.02, 0.1])
 """Prior of a beam: tables of a HDL-64 are off by up to 0.4°, its ranges by 10 to 30 mm."""
+FIRST_SIGMAS = np.array([np.radians(0.05), np.radians(0.05), 5e-3, 0.1])
+"""What is assumed at first: wider, and the elevations take up what is of another kind."""
 LEAST_SIGMAS = np.array([np.radians(0.01), np.radians(0.01), 5e-4, 0.0])
-MEAN_SIGMAS = np.array([np.inf, 1e-5, np.inf, 1e-5])
+MEAN_SIGMAS = np.array([1e-5, 1e-5, 1e-4, 1e-5])
 """The same of their mean: a turn of all azimuths and a shift of all heights are those of the mount."""
 STEP_SIGMA = 5e-4
 """m, of the heights of neighbours, save where a block of lasers ends and another one begins."""
@@ -47,13 +49,11 @@ class Step(Value):
     poses : (K, 6) `[δr, δt]` of the lidar at the knots, map frame
     beams : (B, 4) elevation and azimuth, rad, range and height, m
     covariance : (4 B, 4 B) of the beams
-    chi2 : mean squared error of the points before it, in units of their own deviations
     """
 
     poses: Array
     beams: Array
     covariance: Array
-    chi2: float
 
 
 def knots_of(times: Array) -> tuple[NDArray[np.intp], Array, int]:
@@ -63,9 +63,7 @@ def knots_of(times: Array) -> tuple[NDArray[np.intp], Array, int]:
     return before, at - before, int(before[-1]) + 2
 
 
-def solve(
-    shots: Shots, cells: Cells, beams: Array, sigmas: Array, range_sigma: float
-) -> Step:
+def solve(shots: Shots, cells: Cells, beams: Array, sigmas: Array, range_sigma: float) -> Step:
     """Move poses and beams so that the points of each cell lie in one plane.
 
     Parameters
@@ -74,9 +72,8 @@ def solve(
     sigmas : (4,) standard deviations of the beams, as far as they are known
     range_sigma : m, of a return
     """
-    before, shares, n_knots = knots_of(shots.times)
+    rows, n_knots = _rows(shots, cells, len(beams))
     n_poses, n_beams = 6 * n_knots, len(beams)
-    rows = _rows(shots, cells, before, shares, n_knots, n_beams)
     sigma = np.maximum(range_sigma, cells.roughness)
     counts = np.bincount(cells.cells, minlength=cells.n_cells)[cells.cells]
     weights = np.minimum(1.0, INDEPENDENT / counts) / sigma**2
@@ -88,34 +85,29 @@ def solve(
     g[n_poses:] += prior @ beams.ravel()
     # The first pose stays.
     H[range(6), range(6)] += 1e10
-    covariance = np.linalg.inv(H)
+    covariance: Array = np.linalg.inv(H)
     x = -covariance @ g
     return Step(
         x[:n_poses].reshape(n_knots, 6),
         x[n_poses:].reshape(n_beams, N_OFFSETS),
         covariance[n_poses:, n_poses:],
-        float((weights * cells.across**2).sum() / weights.sum() * (1 / range_sigma**2)),
     )
 
 
-def _rows(
-    shots: Shots,
-    cells: Cells,
-    before: NDArray[np.intp],
-    shares: Array,
-    n_knots: int,
-    n_beams: int,
-) -> sparse.csr_matrix:
-    """Derivatives of `across` by all states.
+def _rows(shots: Shots, cells: Cells, n_beams: int) -> tuple[sparse.csr_matrix, int]:
+    """Return the derivatives of `across` by all states, and the number of knots.
 
     Those by the beams are taken where the return would be in the plane. Taken where it is they would
     hold its noise, and all would agree that a flatter world has less of it.
     """
+    before, shares, n_knots = knots_of(shots.times)
     n, at = cells.normals, cells.chosen
     rise, turn, ray, up = (slope[at] for slope in shots.slopes())
     cosine = (n * ray).sum(axis=1)
     seen = np.abs(cosine) > LEAST_SLOPE
-    in_plane = 1.0 - np.where(seen, cells.across / np.where(seen, cosine, 1.0), 0.0) / shots.ranges[at]
+    in_plane = (
+        1.0 - np.where(seen, cells.across / np.where(seen, cosine, 1.0), 0.0) / shots.ranges[at]
+    )
     lever = shots.ranges[at, None] * ray
     pose = np.hstack([np.cross(lever, n), n])
     j, s = before[at], shares[at, None]
@@ -134,12 +126,10 @@ def _rows(
     columns = np.hstack([poses, beams])
     starts = np.arange(0, columns.size + 1, columns.shape[1])
     shape = (len(at), 6 * n_knots + N_OFFSETS * n_beams)
-    return sparse.csr_matrix((values.ravel(), columns.ravel(), starts), shape=shape)
+    return sparse.csr_matrix((values.ravel(), columns.ravel(), starts), shape=shape), n_knots
 
 
-def _without_planes(
-    rows: sparse.csr_matrix, weights: Array, cells: Cells
-) -> tuple[Array, Array]:
+def _without_planes(rows: sparse.csr_matrix, weights: Array, cells: Cells) -> tuple[Array, Array]:
     """Return the normal equations of poses and beams, height and slopes of each plane eliminated."""
     n = len(weights)
     planes = np.column_stack([np.ones(n), cells.along])
@@ -154,10 +144,11 @@ def _without_planes(
     inverse = sparse.block_diag(np.linalg.inv(own), format="csr")
     weighted = rows.multiply(weights[:, None]).tocsr().T.tocsr()
     mixed = (weighted @ basis).tocsr()
-    H = weighted @ rows - mixed @ (inverse @ mixed.T)
+    # Its rows are full: dense products are several times faster.
+    H = (weighted @ rows).toarray() - mixed.toarray() @ (inverse @ mixed.T).toarray()
     pulled = basis.T @ (weights * cells.across)
     g = weighted @ cells.across - mixed @ (inverse @ pulled)
-    return np.asarray(H.todense()), np.asarray(g)
+    return H, np.asarray(g)
 
 
 def _prior(beams: Array, sigmas: Array) -> Array:

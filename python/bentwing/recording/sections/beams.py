@@ -49,4 +49,6 @@ class Beams(Section):
     @property
     def n_beams(self) -> int:
         """Number of beams."""
-        return max(len(v) for v in (self.elevations, self.azimuths, self.ranges, self.heights, self.table))
+        return max(
+            len(v) for v in (self.elevations, self.azimuths, self.ranges, self.heights, self.table)
+        )

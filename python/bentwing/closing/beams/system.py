@@ -85,7 +85,7 @@ def solve(shots: Shots, cells: Cells, beams: Array, sigmas: Array, range_sigma: 
     g[n_poses:] += prior @ beams.ravel()
     # The first pose stays.
     H[range(6), range(6)] += 1e10
-    covariance: Array = np.linalg.inv(H)
+    covariance = np.asarray(np.linalg.inv(H), dtype=np.float64)
     x = -covariance @ g
     return Step(
         x[:n_poses].reshape(n_knots, 6),

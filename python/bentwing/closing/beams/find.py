@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bentwing.closing.beams.cells import find_cells
-from bentwing.closing.beams.found import FoundBeams
+from bentwing.closing.beams.found import FoundBeams, are_off
 from bentwing.closing.beams.shots import sample_shots
 from bentwing.closing.beams.system import FIRST_SIGMAS, N_OFFSETS, knots_of, shown_sigmas, solve
 
@@ -36,7 +36,7 @@ MIN_CELLS = 100
 
 
 def find_beams(estimate: Estimate, batches: Iterable[Batch], payload: Payload) -> FoundBeams | None:
-    """Find by how much the beams are off, together with the poses; None where nothing shows it.
+    """Find by how much the beams are off, together with the poses; None where they are hardly off.
 
     Parameters
     ----------
@@ -58,8 +58,11 @@ def find_beams(estimate: Estimate, batches: Iterable[Batch], payload: Payload) -
         shots = shots.moved(poses[:, :3], poses[:, 3:], step.beams)
         beams = beams + step.beams
         sigmas = shown_sigmas(beams, step.covariance)
-        if iteration + 1 >= ITERATIONS[0] and (np.abs(step.beams) < SMALL).all():
+        settled = not are_off(beams) or (np.abs(step.beams) < SMALL).all()
+        if iteration + 1 >= ITERATIONS[0] and settled:
             break
+    if not are_off(beams):
+        return None
     beams[(np.abs(beams[:, :2]) > MAX_ANGLE).any(axis=1), :3] = 0.0
     return FoundBeams(
         beams,

@@ -27,6 +27,16 @@ LEAST = np.array([np.radians(0.015), np.radians(0.015), 1.5e-3, 5e-3])
 DIGITS = 6
 
 
+def are_off(offsets: Array) -> bool:
+    """Whether beams (B, 4) are off by more in the mean than they can be known."""
+    return bool((_rms(offsets) > LEAST).any())
+
+
+def _rms(offsets: Array) -> Array:
+    rms: Array = np.sqrt((offsets**2).mean(axis=0))
+    return rms
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class FoundBeams(Value):
     """What the beams of a lidar are off.
@@ -50,14 +60,13 @@ class FoundBeams(Value):
     @property
     def rms(self) -> Array:
         """(4,) how far the beams are off in the mean."""
-        rms: Array = np.sqrt((self.offsets**2).mean(axis=0))
-        return rms
+        return _rms(self.offsets)
 
     @property
     def matters(self) -> bool:
-        """Whether the beams are off by more than they are known, and the map is flatter without it."""
+        """Whether the map is flatter without it."""
         before, after = self.roughness
-        return bool((self.rms > LEAST).any()) and after < before
+        return after < before
 
     def sentence(self) -> str:
         """Say what was found."""

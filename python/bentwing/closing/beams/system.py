@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import sparse
+from scipy import linalg, sparse
 
 from bentwing.base.value import Value
 
@@ -85,13 +85,19 @@ def solve(shots: Shots, cells: Cells, beams: Array, sigmas: Array, range_sigma: 
     g[n_poses:] += prior @ beams.ravel()
     # The first pose stays.
     H[range(6), range(6)] += 1e10
-    covariance = np.asarray(np.linalg.inv(H), dtype=np.float64)
-    x = -covariance @ g
-    return Step(
-        x[:n_poses].reshape(n_knots, 6),
-        x[n_poses:].reshape(n_beams, N_OFFSETS),
-        covariance[n_poses:, n_poses:],
-    )
+    poses, offsets, covariance = _solved(H, g, n_poses)
+    return Step(poses.reshape(n_knots, 6), offsets.reshape(n_beams, N_OFFSETS), covariance)
+
+
+def _solved(H: Array, g: Array, n_poses: int) -> tuple[Array, Array, Array]:
+    """Return poses and beams that solve `H x = -g`, and the covariance of the beams."""
+    of_poses, mixed = H[:n_poses, :n_poses], H[:n_poses, n_poses:]
+    factor = linalg.cho_factor(of_poses, lower=True)
+    known = linalg.cho_solve(factor, np.column_stack([mixed, g[:n_poses]]))
+    condensed = H[n_poses:, n_poses:] - mixed.T @ known[:, :-1]
+    covariance = np.asarray(np.linalg.inv(condensed), dtype=np.float64)
+    beams = -covariance @ (g[n_poses:] - mixed.T @ known[:, -1])
+    return -known[:, -1] - known[:, :-1] @ beams, beams, covariance
 
 
 def _rows(shots: Shots, cells: Cells, n_beams: int) -> tuple[sparse.csr_matrix, int]:

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
+from bentwing.base.threads import MOST_THREADS
+
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
@@ -71,8 +73,8 @@ def thread_count(threads: int | None) -> int:
     if threads is None:
         return 0
     count = instance("threads", threads, int, "give a number from 1 on, or None for all cores")
-    if count < 1:
-        msg = f"threads: expected a number from 1 on, or None for all cores, got {count}"
+    if not 1 <= count <= MOST_THREADS:
+        msg = f"threads: expected a number from 1 to {MOST_THREADS}, or None for all cores, got {count}"
         raise ValueError(msg)
     return count
 

@@ -13,6 +13,7 @@ from bentwing.base.clock import NS_PER_S, Clock
 from bentwing.base.errors import InputError
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -22,6 +23,7 @@ _KITTI_COLUMNS = 12
 _LATEST_NS = 2**62  # beyond it differences of stamps overflow
 _LARGEST_EXPONENT = 30  # of ten, of a stamp in any unit; times the nanosecond's 0 it is 0
 _MOST_BYTES = 2**30
+_LONGEST_LINE = 10_000  # characters; what is longer is read as several lines
 
 
 def write_poses(
@@ -40,6 +42,8 @@ def write_poses(
     clock_origin_ns : absolute time of `times == 0`, ns UTC
     """
     stamps = Clock(clock_origin_ns).to_absolute_text(times)
+    # The sign of a zero differs between processors, as the rounding of the last digit of a sum does.
+    poses = np.hstack([np.round(poses[:, :3], 6), np.round(poses[:, 3:], 9)]) + 0.0
     lines = [
         f"{stamp} {x:.6f} {y:.6f} {z:.6f} {qx:.9f} {qy:.9f} {qz:.9f} {qw:.9f}\n"
         for stamp, (x, y, z, qx, qy, qz, qw) in zip(stamps, poses.tolist(), strict=True)
@@ -147,8 +151,8 @@ def read_rows(
     return np.array(stamps_ns, dtype=np.int64), np.array(rows)
 
 
-def read_lines(path: Path) -> list[str]:
-    """Return the lines of a text file.
+def read_lines(path: Path) -> Iterator[str]:
+    """Yield the lines of a text file.
 
     Raises
     ------
@@ -157,7 +161,9 @@ def read_lines(path: Path) -> list[str]:
     """
     require_file(path)
     try:
-        return path.read_text(encoding="utf-8").splitlines()
+        with path.open(encoding="utf-8") as file:
+            while line := file.readline(_LONGEST_LINE):
+                yield line.rstrip("\r\n")
     except (OSError, UnicodeDecodeError) as error:
         msg = f"{path}: not readable as a trajectory ({error})"
         raise InputError(msg) from error

@@ -12,6 +12,34 @@ if TYPE_CHECKING:
 
     from bentwing.base.errors import InputError
 
+MOST_OF_YAML = 2**20  # bytes; settings and heads have some thousand
+_DEEPEST = 50  # sections in sections
+
+
+def parse_yaml(text: str) -> object:
+    """Return what a text says.
+
+    Raises
+    ------
+    yaml.YAMLError
+        It is not YAML, repeats parts of itself by aliases, or is nested too deeply.
+    """
+    depth = 0
+    # Events come without recursion, and before anything that an alias multiplies is made.
+    for event in yaml.parse(text, yaml.SafeLoader):
+        if isinstance(event, yaml.AliasEvent):
+            raise _refused("an alias (*name) is not read; write the value itself", event)
+        depth += isinstance(event, yaml.CollectionStartEvent)
+        depth -= isinstance(event, yaml.CollectionEndEvent)
+        if depth > _DEEPEST:
+            raise _refused(f"more than {_DEEPEST} sections in each other", event)
+    return yaml.safe_load(text)
+
+
+def _refused(problem: str, event: yaml.Event) -> yaml.YAMLError:
+    line = event.start_mark.line + 1 if event.start_mark else 0
+    return yaml.YAMLError(f"{problem}, line {line}")
+
 
 def read_yaml(path: Path, advice: str, kind: type[InputError]) -> object:
     """Return what a file says.
@@ -28,7 +56,15 @@ def read_yaml(path: Path, advice: str, kind: type[InputError]) -> object:
         Of this kind, if the file cannot be read or is not YAML.
     """
     try:
-        return yaml.safe_load(path.read_text(encoding="utf-8"))
+        if path.exists() and not path.is_file():
+            msg = f"{path}: is not a file; give a YAML text file"
+            raise kind(msg)
+        with path.open("rb") as file:
+            data = file.read(MOST_OF_YAML + 1)
+        if len(data) > MOST_OF_YAML:
+            msg = f"{path}: has more than {MOST_OF_YAML} bytes; give a YAML text file of fewer"
+            raise kind(msg)
+        return parse_yaml(data.decode("utf-8"))
     except FileNotFoundError:
         msg = f"{path}: no such file; {advice}"
     except OSError as error:

@@ -21,10 +21,10 @@ _FOLDER = RecordedFolder("calibration.json", "bentwing calibration", "calibratio
 class CalibrationFolder(ResultFolder):
     """Folder that holds one calibration; see `ResultFolder`."""
 
-    def __init__(self, out: Path) -> None:
-        super().__init__(out, _FOLDER)
+    def __init__(self, out: Path, inputs: Iterable[Path] = ()) -> None:
+        super().__init__(out, _FOLDER, inputs)
 
     def finish(self, found: Calibrated, inputs: Iterable[Path]) -> None:
-        """Write payload.yaml and calibration.json, and remove what is left of an earlier one."""
+        """Write payload.yaml, and last of all calibration.json."""
         found.payload.save(self.file(PAYLOAD))
         self.complete((path for path in inputs if path.is_file()), as_record(found))

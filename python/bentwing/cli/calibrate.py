@@ -38,18 +38,18 @@ def command(
     from bentwing.cli.calibrate_page import page
     from bentwing.report import draw_wall
 
-    folder = CalibrationFolder(out)
-    found = calibrate(
-        recording,
-        payload,
-        start=start,
-        duration=duration,
-        threads=threads,
-        progress=create_progress(quiet=quiet),
-    )
-    if (wall := found.wall) is not None:
-        draw_wall(folder.file("wall.png"), wall.along, wall.across, wall.halves, wall.gaps)
-    folder.finish(found, [*recording, payload])
+    with CalibrationFolder(out, [*recording, payload]) as folder:
+        found = calibrate(
+            recording,
+            payload,
+            start=start,
+            duration=duration,
+            threads=threads,
+            progress=create_progress(quiet=quiet),
+        )
+        if (wall := found.wall) is not None:
+            draw_wall(folder.file("wall.png"), wall.along, wall.across, wall.halves, wall.gaps)
+        folder.finish(found, [*recording, payload])
     if quiet:
         return
     console = Console()

@@ -86,13 +86,14 @@ def command(
         raise UsageError(msg)
     arm = None if lever_arm is None else _arm(lever_arm)
     question = Question(reference_trajectory, reference_map, clock_offset, arm, changed_beyond)
-    folder = EvaluationFolder(run / "evaluation" if out is None else out)
-    progress = create_progress(quiet=quiet)
-    result = evaluate(subject, question, progress)
-    with progress.stage("drawing"):
-        draw_evaluation(folder, result)
     references = [path for path in (reference_trajectory, reference_map) if path is not None]
-    folder.finish(result, question, [*subject.files(), *references])
+    progress = create_progress(quiet=quiet)
+    results = run / "evaluation" if out is None else out
+    with EvaluationFolder(results, references) as folder:
+        result = evaluate(subject, question, progress)
+        with progress.stage("drawing"):
+            draw_evaluation(folder, result)
+        folder.finish(result, question, [*subject.files(), *references])
     if quiet:
         return
     console = Console()

@@ -4,9 +4,10 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
 import traceback
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -14,6 +15,9 @@ from bentwing.base.errors import BentwingError, UsageError
 from bentwing.cli.command import CONTEXT, closing
 from bentwing.cli.commands import LazyCommands
 from bentwing.cli.mistakes import Mistake, explain
+
+if TYPE_CHECKING:
+    from types import FrameType
 
 INTERRUPTED = 130
 _UNEXPECTED = 70  # EX_SOFTWARE of sysexits.h
@@ -62,7 +66,17 @@ def _options(
 
 def run() -> None:
     """Run the command line and end the process with its exit code."""
+    # Whoever ends the process finds the reason in the record, as after Ctrl-C.
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(number) is signal.SIG_DFL:
+            signal.signal(number, _interrupt)
     sys.exit(run_command(sys.argv[1:]))
+
+
+def _interrupt(number: int, frame: FrameType | None) -> None:
+    del frame
+    msg = f"ended by {signal.Signals(number).name}"
+    raise KeyboardInterrupt(msg)
 
 
 def run_command(arguments: list[str]) -> int:
@@ -76,8 +90,8 @@ def run_command(arguments: list[str]) -> int:
         return _fail(str(error), error.exit_code)
     except Mistake as error:
         return _fail(explain(error), UsageError.exit_code)
-    except (KeyboardInterrupt, typer.Abort):
-        return _fail("interrupted", INTERRUPTED)
+    except (KeyboardInterrupt, typer.Abort) as error:
+        return _fail(str(error) or "interrupted", INTERRUPTED)
     except BrokenPipeError:
         # the reader of our output has gone; nothing more can be said
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from bentwing.base.errors import UsageError
+from bentwing.base.threads import MOST_THREADS
 from bentwing.closing.georeference.names import GeoreferenceMode
 from bentwing.map.formats import MapFormat
 from bentwing.odometry.names import EstimatorName
@@ -195,6 +196,7 @@ Threads = Annotated[
         "-j",
         metavar="N",
         min=1,
+        max=MOST_THREADS,
         show_default="all cores",
         help="Number of threads; the result does not depend on it.",
     ),

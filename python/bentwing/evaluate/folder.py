@@ -5,7 +5,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from bentwing.base.result_folder import RecordedFolder, ResultFolder
+from bentwing.base.result_folder import ResultFolder
+from bentwing.base.run_record import EVALUATION_FOLDER
 from bentwing.evaluate.statistics import summary
 
 if TYPE_CHECKING:
@@ -14,15 +15,13 @@ if TYPE_CHECKING:
 
     from bentwing.evaluate.evaluation import Evaluation, Question
 
-_FOLDER = RecordedFolder("evaluation.json", "bentwing evaluation", "evaluation", "an")
-
 
 class EvaluationFolder(ResultFolder):
     """Folder that holds one evaluation; see `ResultFolder`."""
 
-    def __init__(self, out: Path) -> None:
-        super().__init__(out, _FOLDER)
+    def __init__(self, out: Path, inputs: Iterable[Path] = ()) -> None:
+        super().__init__(out, EVALUATION_FOLDER, inputs)
 
     def finish(self, evaluation: Evaluation, question: Question, inputs: Iterable[Path]) -> None:
-        """Write evaluation.json, and remove what is left of an earlier evaluation."""
+        """Write evaluation.json, last of all."""
         self.complete(inputs, {"question": question, **summary(evaluation)})

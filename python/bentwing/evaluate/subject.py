@@ -3,12 +3,12 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from bentwing.base.errors import UsageError
+from bentwing.base.run_record import RECORD, finished_record
 from bentwing.map.formats import MAP_SUFFIXES
 
 
@@ -39,7 +39,9 @@ def find_subject(path: Path | str) -> Subject:
     Raises
     ------
     UsageError
-        If there is none of them.
+        If there is none of them, or the folder holds a run that is not complete.
+    InputError
+        If a file is not the one that the run wrote.
     """
     path = Path(path)
     if path.is_file():
@@ -49,7 +51,7 @@ def find_subject(path: Path | str) -> Subject:
     poses = [path / "trajectory.txt", path / "odometry.txt"]
     trajectory, odometry = (file if file.is_file() else None for file in poses)
     map_path = next((file for file in maps if file.is_file()), None)
-    found = Subject(trajectory, odometry, map_path, _georeference(path / "run.json"))
+    found = Subject(trajectory, odometry, map_path, _georeference(path))
     if not found.files():
         what = "has neither trajectory.txt nor map.laz" if path.is_dir() else "does not exist"
         msg = (
@@ -60,9 +62,6 @@ def find_subject(path: Path | str) -> Subject:
     return found
 
 
-def _georeference(record: Path) -> dict[str, Any] | None:
-    try:
-        found = json.loads(record.read_text(encoding="utf-8")).get("georeference")
-    except (OSError, ValueError, AttributeError):
-        return None
-    return found if isinstance(found, dict) else None
+def _georeference(folder: Path) -> dict[str, Any] | None:
+    """Return what the record of a run says; a folder of another program has none."""
+    return finished_record(folder).get("georeference") if (folder / RECORD).exists() else None

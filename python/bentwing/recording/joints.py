@@ -10,8 +10,8 @@ from bentwing.base.errors import RecordingError
 from bentwing.recording.messages import wire
 
 if TYPE_CHECKING:
+    from bentwing.recording.containers.interface import Source
     from bentwing.recording.containers.scanned import TopicInfo
-    from bentwing.recording.containers.source import Source
 
 # Messages that are looked at: drivers that share a topic each give joints of their own.
 N_PEEKED = 200

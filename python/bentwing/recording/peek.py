@@ -16,8 +16,8 @@ from bentwing.recording.messages.lidar_messages import LIDAR_MESSAGES
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from bentwing.recording.containers.interface import Source
     from bentwing.recording.containers.scanned import TopicInfo
-    from bentwing.recording.containers.source import Source
     from bentwing.recording.packets.clock import ClockReading
     from bentwing.recording.packets.sensors import ImuPackets, LidarPackets
     from bentwing.recording.point_times import TimeReading

@@ -10,7 +10,7 @@ import yaml
 
 from bentwing.base.errors import InputError, UsageError
 from bentwing.base.plain import plain
-from bentwing.base.yaml_files import read_yaml
+from bentwing.base.yaml_files import parse_yaml, read_yaml
 from bentwing.odometry import ESTIMATORS
 from bentwing.odometry.registry import require_settings
 from bentwing.recording.payload import Payload, PayloadLike, as_payload
@@ -108,7 +108,7 @@ def changes_of(assignments: Iterable[str], estimator: str) -> dict[str, Any]:
             msg = f"--set {text!r}: give --payload and --estimator instead, and settings of {estimator}"
             raise UsageError(msg)
         try:
-            change = yaml.safe_load(value)
+            change: Any = parse_yaml(value)
         except yaml.YAMLError:
             msg = f"--set {text!r}: the value is not valid YAML"
             raise UsageError(msg) from None

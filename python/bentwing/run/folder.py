@@ -10,7 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bentwing.base.atomic import write_text
-from bentwing.base.provenance import describe_input
+from bentwing.base.errors import InputError
+from bentwing.base.provenance import describe_input, files_of
+from bentwing.base.result_folder import reason_of
 from bentwing.base.run_record import RECORD, RUN_FOLDER
 from bentwing.run.record import RunRecord
 
@@ -29,28 +31,42 @@ class RunFolder:
 
     run.json is there from the first moment with `"complete": false` and becomes `true` at the
     end. A run that fails or is interrupted keeps what it has written and records the stage and
-    the reason. The files of an earlier run are replaced one by one as this run's become ready;
-    what is then left of the earlier run is removed when this one completes.
+    the reason. From then on nothing of an earlier run is there, except while a run that resumes it
+    has not yet chosen what it goes on with. The lock of the folder keeps other processes out.
 
     Parameters
     ----------
     out : folder, made if it does not exist
     settings : what decides the run, in plain JSON types
+    resume : keep the files of an earlier run until `remove_earlier` is called
+    inputs : files and folders that are still to be read
 
     Raises
     ------
     UsageError
-        If `out` is a file, cannot be made, or holds files that are not of a bentwing run.
+        If `out` is a file, cannot be made, holds files that are not of a bentwing run, or another
+        process writes there.
     """
 
-    def __init__(self, out: Path, settings: Mapping[str, Any] | None = None) -> None:
+    def __init__(
+        self,
+        out: Path,
+        settings: Mapping[str, Any] | None = None,
+        *,
+        resume: bool = False,
+        inputs: Iterable[Path] = (),
+    ) -> None:
         self.path = Path(out)
         self.record = RunRecord(dict(settings or {}))
+        self._resume, self._read = resume, inputs
         self._earlier: list[str] = []
+        self._inputs: dict[Path, dict[str, Any]] = {}
 
     def __enter__(self) -> Self:
-        self._earlier = RUN_FOLDER.claim(self.path)
+        self._lock, self._earlier = RUN_FOLDER.claim(self.path, self._read)
         self.save()
+        if not self._resume:
+            self.remove_earlier()
         return self
 
     def __exit__(
@@ -59,17 +75,31 @@ class RunFolder:
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        if error is None:
-            self.record.complete, self.record.stage = True, "done"
-            self._remove_rest_of_earlier()
-        else:
+        try:
+            if error is None:
+                self._complete()
+            else:
+                self.fail(error)
+                self.save()
+        finally:
+            self._lock.release()
+
+    def _complete(self) -> None:
+        record = self.record
+        try:
+            self.confirm_inputs()
+            written = [name for name in record.files if (self.path / name).exists()]
+            record.hashes = {name: _hash_of(self.path / name) for name in written}
+            record.complete, record.stage = True, "done"
+        except InputError as error:
             self.fail(error)
-        self.save()
+            raise
+        finally:
+            self.save()
 
     def fail(self, error: BaseException) -> None:
         """Record why the run ends early."""
-        interrupted = isinstance(error, KeyboardInterrupt)
-        self.record.reason = "interrupted" if interrupted else str(error) or type(error).__name__
+        self.record.reason = reason_of(error)
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
@@ -84,9 +114,28 @@ class RunFolder:
     def add_inputs(self, paths: Iterable[Path]) -> None:
         """Record the files a run reads, with size and hash; folders stand for their files."""
         for path in paths:
-            path = Path(path)
-            files = sorted(path.rglob("*")) if path.is_dir() else [path]
-            self.record.inputs += [describe_input(file) for file in files if file.is_file()]
+            for file in files_of(Path(path)):
+                self._inputs[file] = found = describe_input(file)
+                self.record.inputs.append(found)
+
+    def confirm_inputs(self) -> None:
+        """Refuse a result whose inputs are not what they were when the run began.
+
+        Raises
+        ------
+        InputError
+        """
+        for file, before in self._inputs.items():
+            try:
+                is_same = describe_input(file) == before
+            except OSError as error:
+                msg = f"{file}: cannot be read any more ({error.strerror}), the run has used it"
+                raise InputError(msg) from error
+            if not is_same:
+                msg = (
+                    f"{file}: has changed while the run used it; run it again with the file at rest"
+                )
+                raise InputError(msg)
 
     def add_recordings(self, paths: Iterable[Path], start_ns: int) -> None:
         """Record where the recordings lie, and their clock.
@@ -131,7 +180,13 @@ class RunFolder:
         text = json.dumps(self.described(), indent=1, allow_nan=False)
         write_text(self.path / RECORD, text + "\n")
 
-    def _remove_rest_of_earlier(self) -> None:
-        for name in self._earlier:
-            if name not in self.record.files:
-                (self.path / name).unlink(missing_ok=True)
+    def remove_earlier(self) -> None:
+        """Remove what an earlier run has left, but for the files that this run has made its own."""
+        RUN_FOLDER.clear(self.path, (n for n in self._earlier if n not in self.record.files))
+        self._earlier = []
+        self.save()
+
+
+def _hash_of(path: Path) -> dict[str, Any]:
+    found = describe_input(path)
+    return {key: found[key] for key in ("bytes", "sha256", "hashed")}

@@ -127,11 +127,12 @@ def run_recording(
     What the stages have found; `Run.of` makes a run of it.
     """
     watch = as_progress(progress)
+    read = [path for path in (settings.prior_map, payload_file) if path is not None]
     # Refuses at once what the estimator cannot do.
     odometry.create(settings.estimator, settings.payload, settings.of_estimator, settings.threads)
     with (
         opened(paths, settings, watch) as head,
-        RunFolder(Path(out), settings.to_json()) as folder,
+        RunFolder(Path(out), settings.to_json(), resume=resume, inputs=map(Path, read)) as folder,
     ):
         folder.record.settings = head.settings.to_json()
         job = stages.Job(head.part, folder, head.settings, watch)
@@ -139,6 +140,7 @@ def run_recording(
             job = replace(job, prior=_open_inputs(job, payload_file))
             checkpoint = Checkpoint(folder, settings)
             done, found = checkpoint.restore(resume=resume)
+            folder.remove_earlier()
             if found.set_up is not None and found.set_up != head.set_up:
                 head.use(found.set_up)
                 job = replace(job, part=head.part, settings=head.settings)

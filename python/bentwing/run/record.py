@@ -37,6 +37,7 @@ class RunRecord:
     recordings : where the recordings lie, so that their points can be read again
     start_ns : what is time zero, ns UTC
     files : names of the results in the folder
+    hashes : size and SHA-256 of these, once the run is complete
     timings : s of wall time by stage
     found : what the stages have found
     """
@@ -49,6 +50,7 @@ class RunRecord:
     recordings: list[Path] = field(default_factory=list)
     start_ns: int | None = None
     files: list[str] = field(default_factory=list)
+    hashes: dict[str, dict[str, Any]] = field(default_factory=dict)
     timings: dict[str, float] = field(default_factory=dict)
     found: Found = field(default_factory=Found)
     started: str = field(default_factory=_now)
@@ -76,6 +78,7 @@ class RunRecord:
                 "recordings": self.recordings,
                 "start_ns": self.start_ns,
                 "files": self.files,
+                "hashes": self.hashes,
                 "timings": {**self.timings, **self.found.timings, "total": total},
                 **found,
                 "peak_memory_mb": round(_peak_memory() / 1e6, 1),

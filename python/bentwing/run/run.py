@@ -11,7 +11,7 @@ from bentwing.base.calibration import Calibration
 from bentwing.base.covariances import PoseCovariances
 from bentwing.base.errors import InputError, UsageError
 from bentwing.base.estimate import Estimate
-from bentwing.base.run_record import read_record
+from bentwing.base.run_record import finished_record, understood
 from bentwing.base.trajectory import DT, read_tum
 from bentwing.base.window_record import WindowRecord
 from bentwing.evaluate.verdict import Verdict, verdict_of
@@ -87,26 +87,24 @@ class Run:
             If its trajectory cannot be read.
         """
         folder = Path(out)
-        record = require_single(folder, read_record(folder))
-        written = next(name for name in record["files"] if name.startswith("map."))
-        return cls(
-            folder,
-            estimate_of(folder, record),
-            verdict_in(record),
-            tuple(record["warnings"]),
-            folder / written,
-            folder / "report.html",
-        )
+        record = require_single(folder, finished_record(folder))
+        with understood(folder):
+            (written, *_) = (name for name in record["files"] if name.startswith("map."))
+            return cls(
+                folder,
+                estimate_of(folder, record),
+                verdict_in(record),
+                tuple(record["warnings"]),
+                folder / written,
+                folder / "report.html",
+            )
 
 
 def require_single(folder: Path, record: dict[str, Any]) -> dict[str, Any]:
-    """Return the record of a run that is complete and no merged one, or raise UsageError."""
+    """Return the record of a run that is no merged one, or raise UsageError."""
     if record.get("runs"):
         of = ", ".join(str(run.get("folder")) for run in record["runs"])
         msg = f"{folder}: holds a merged map; give the runs that it was made of ({of}) instead"
-        raise UsageError(msg)
-    if not record.get("complete"):
-        msg = f"{folder}: the run is not complete; finish it with `bentwing map ... --resume` first"
         raise UsageError(msg)
     return record
 

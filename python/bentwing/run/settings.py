@@ -12,6 +12,7 @@ from pydantic import BaseModel, Field, ValidationError, field_validator
 from bentwing.base.errors import BentwingError, UsageError
 from bentwing.base.plain import plain
 from bentwing.base.settings import Settings
+from bentwing.base.threads import MOST_THREADS
 from bentwing.base.units import Metres, Unit
 from bentwing.base.validation import describe
 from bentwing.closing.georeference.settings import GeoreferenceSettings
@@ -43,7 +44,7 @@ class MapSettings(Settings):
     )
     cleaning: CleanSettings = Field(default=CleanSettings(), description="what the map leaves out")
     threads: int | None = Field(
-        default=None, ge=1, description="number of threads; default: all cores"
+        default=None, ge=1, le=MOST_THREADS, description="number of threads; default: all cores"
     )
 
     @field_validator("map_format", mode="before")

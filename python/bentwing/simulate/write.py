@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from bentwing.base.errors import UsageError
+from bentwing.base.staged_folder import staged_folder
 from bentwing.simulate.imu import RATE_HZ
 from bentwing.simulate.records import (
     CloudRecord,
@@ -37,6 +38,8 @@ if TYPE_CHECKING:
     from bentwing.simulate.scenario import Scenario
     from bentwing.simulate.setup import Setup
 
+PAYLOAD = "payload.yaml"
+
 
 @dataclass(frozen=True, slots=True)
 class SimulatedRecording:
@@ -63,7 +66,17 @@ class SimulatedRecording:
 def write_recording(
     setup: Setup, scenario: Scenario, out: Path, progress: Callable[[float], None] | None
 ) -> SimulatedRecording:
-    """Streams the setup's sensors into a bag and writes the truth beside it."""
+    """Streams the setup's sensors into a bag and writes the truth beside it, all or nothing."""
+    require_no_recording(out)
+    final = _files(out, scenario.format)
+    with staged_folder(out, final.recording.name) as stage:
+        _write(setup, scenario, stage, progress)
+    return final
+
+
+def _write(
+    setup: Setup, scenario: Scenario, out: Path, progress: Callable[[float], None] | None
+) -> None:
     files = _files(out, scenario.format)
     write_yaml(files.scenario, scenario.model_dump(mode="json"))
     write_yaml(files.payload, payload(setup, scenario))
@@ -83,7 +96,6 @@ def write_recording(
     if setup.sensors.samples is not None:
         write_yaml(out / "truth_realism.yaml", setup.realism.truth())
         setup.sensors.samples.write(out / "truth_points.npy", setup.first)
-    return files
 
 
 def require_no_recording(out: Path) -> None:
@@ -96,11 +108,9 @@ def require_no_recording(out: Path) -> None:
 
 def _files(out: Path, kind: str) -> SimulatedRecording:
     recording = out / ("recording.bag" if kind == "bag" else "recording")
-    require_no_recording(out)
-    out.mkdir(parents=True, exist_ok=True)
     return SimulatedRecording(
         recording=recording,
-        payload=out / "payload.yaml",
+        payload=out / PAYLOAD,
         trajectory=out / "truth_trajectory.txt",
         scene=out / "truth_scene.ply",
         calibration=out / "truth_calibration.yaml",

@@ -60,5 +60,5 @@ def test_a_wrong_type_is_refused_with_what_to_do():
 def test_threads_are_a_number_or_all_cores():
     assert thread_count(None) == 0
     assert thread_count(2) == 2
-    with pytest.raises(ValueError, match="threads: expected a number from 1 on, or None"):
+    with pytest.raises(ValueError, match="threads: expected a number from 1 to 1024, or None"):
         thread_count(-1)

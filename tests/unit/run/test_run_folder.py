@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
 import hashlib
 import json
+import os
+import platform
 
 import numpy as np
 import pytest
@@ -8,16 +10,18 @@ import pytest
 from bentwing.base import provenance
 from bentwing.base.atomic import write_text
 from bentwing.base.calibration import Calibration
-from bentwing.base.errors import EstimationError, UsageError
+from bentwing.base.errors import EstimationError, InputError, UsageError
 from bentwing.base.estimate import Estimate
 from bentwing.base.mount import FixedMount, Pose
 from bentwing.base.plain import plain
 from bentwing.base.provenance import describe_input
-from bentwing.base.run_record import read_record
+from bentwing.base.run_record import finished_record, read_record
 from bentwing.base.trajectory import Trajectory
 from bentwing.base.window_record import WindowRecord
+from bentwing.evaluate.folder import EvaluationFolder
 from bentwing.run.folder import RunFolder
 from bentwing.run.found import Found
+from bentwing.run.run import Run
 
 
 def record_of(out):
@@ -123,16 +127,108 @@ def test_the_next_run_replaces_the_files_of_the_earlier_one(tmp_path):
     assert names == {"trajectory.txt", "map.ply", "run.json", "notes.txt"}
 
 
-def test_files_of_an_earlier_run_stay_until_a_run_completes(tmp_path):
-    run_with(tmp_path, "map.laz")
-    for _ in range(2):
-        with pytest.raises(EstimationError):
-            run_with(tmp_path, "odometry.txt", fail=True)
+def test_nothing_of_an_earlier_run_is_there_once_the_next_begins(tmp_path):
+    run_with(tmp_path, "map.laz", "trajectory.txt")
+    about = tmp_path / "evaluation"
+    with EvaluationFolder(about) as folder:
+        write_text(folder.file("figure.png"), "of the earlier run")
+        folder.complete([], {})
+    with pytest.raises(EstimationError):
+        run_with(tmp_path, "odometry.txt", fail=True)
+    assert {file.name for file in tmp_path.iterdir()} == {"odometry.txt", "run.json"}
+
+
+def test_what_a_resumed_run_does_not_go_on_with_is_removed(tmp_path):
+    with pytest.raises(EstimationError):
+        run_with(tmp_path, "odometry.txt", "map.laz", fail=True)
+    with RunFolder(tmp_path, resume=True) as run:
         assert (tmp_path / "map.laz").exists()
-        assert record_of(tmp_path)["files"] == ["odometry.txt"]
-        assert record_of(tmp_path)["files_of_earlier_run"] == ["map.laz"]
-    run_with(tmp_path, "map.ply")
-    assert {file.name for file in tmp_path.iterdir()} == {"map.ply", "run.json"}
+        run.file("odometry.txt")
+        run.remove_earlier()
+        assert {f.name for f in tmp_path.glob("[!.]*")} == {"odometry.txt", "run.json"}
+
+
+def test_two_processes_cannot_write_into_one_folder(tmp_path):
+    with (
+        RunFolder(tmp_path),
+        pytest.raises(UsageError, match=rf"process {os.getpid()} on .* is writing there"),
+        RunFolder(tmp_path),
+    ):
+        pass
+    run_with(tmp_path, "map.laz")
+
+
+def test_a_lock_that_a_killed_process_left_does_not_keep_others_out(tmp_path):
+    holder = {"process": 1, "host": platform.node(), "since": "2020"}
+    (tmp_path / ".bentwing.lock").write_text(json.dumps(holder))
+    run_with(tmp_path, "map.laz")
+    assert {file.name for file in tmp_path.iterdir()} == {"map.laz", "run.json"}
+
+
+def test_a_lock_of_another_host_is_named_with_what_to_do(tmp_path):
+    holder = {"process": 7, "host": "elsewhere", "since": "2020"}
+    (tmp_path / ".bentwing.lock").write_text(json.dumps(holder))
+    with pytest.raises(UsageError, match=r"process 7 on elsewhere .* remove .*lock"):
+        run_with(tmp_path, "map.laz")
+
+
+def test_an_input_is_not_removed_with_an_earlier_run(tmp_path):
+    run_with(tmp_path, "map.laz")
+    with pytest.raises(UsageError, match="is read"), RunFolder(tmp_path, inputs=[tmp_path]):
+        pass
+    assert (tmp_path / "map.laz").exists()
+
+
+@pytest.mark.parametrize("change", ["other bytes", None])
+def test_a_run_whose_input_changed_meanwhile_is_not_complete(tmp_path, change):
+    given, out = tmp_path / "payload.yaml", tmp_path / "run"
+    given.write_text("first bytes")
+
+    def changing():
+        with RunFolder(out) as run:
+            run.add_inputs([given])
+            given.unlink() if change is None else given.write_text(change)
+
+    with pytest.raises(InputError, match=r"payload\.yaml: (has changed|cannot be read)"):
+        changing()
+    assert record_of(out)["complete"] is False
+    assert "payload.yaml" in record_of(out)["reason"]
+
+
+def test_only_a_complete_run_with_its_own_files_is_read(tmp_path):
+    with pytest.raises(EstimationError):
+        run_with(tmp_path, "map.laz", fail=True)
+    with pytest.raises(UsageError, match="not complete"):
+        finished_record(tmp_path)
+    run_with(tmp_path, "map.laz")
+    assert finished_record(tmp_path)["files"] == ["map.laz"]
+    (tmp_path / "map.laz").write_text("of another run")
+    with pytest.raises(InputError, match=r"map\.laz: is not the file that the run wrote"):
+        finished_record(tmp_path)
+
+
+@pytest.mark.parametrize(
+    "value", [None, 3, "text", [], [1], {}, {"a": 1}, -1e300, 10**40, [[1, 2, 3]], [[None, 1]]]
+)
+@pytest.mark.parametrize(
+    "key",
+    ["files", "hashes", "segments", "start_ns", "windows", "calibration", "warnings", "settings"],
+)
+def test_a_damaged_record_is_refused_in_a_sentence(tmp_path, key, value):
+    with RunFolder(tmp_path) as run:
+        run.record.found = Found(estimate())
+        run.record.start_ns = 0
+        run.write_trajectory("trajectory.txt", estimate(), 0)
+        write_text(run.file("map.ply"), "")
+    record = record_of(tmp_path)
+    (tmp_path / "run.json").write_text(json.dumps({**record, key: value}))
+    try:
+        loaded = Run.load(tmp_path)
+    except (InputError, UsageError) as error:
+        said = str(error)
+    else:
+        said = str(loaded.out)
+    assert str(tmp_path) in said
 
 
 def test_a_record_cannot_make_a_run_delete_outside_its_folder(tmp_path):
@@ -154,11 +250,13 @@ def test_inputs_are_named_with_size_and_hash(tmp_path, monkeypatch):
     assert found["sha256"] == hashlib.sha256(content).hexdigest()
     assert (found["name"], found["bytes"], found["hashed"]) == ("a.mcap", len(content), "all")
     monkeypatch.setattr(provenance, "FULL_HASH_LIMIT", 2**22)
-    ends = hashlib.sha256(content[: 2**20] + content[-(2**20) :]).hexdigest()
+    starts = [(len(content) - 2**20) * k // 65 for k in range(66)]
+    parts = b"".join(content[start : start + 2**20] for start in starts)
+    sampled = hashlib.sha256(parts).hexdigest()
     with RunFolder(tmp_path / "out") as run:
         run.add_inputs([tmp_path / "bag"])
     assert [(i["sha256"], i["hashed"]) for i in record_of(tmp_path / "out")["inputs"]] == [
-        (ends, "first and last MiB")
+        (sampled, "66 blocks of 1 MiB")
     ]
 
 

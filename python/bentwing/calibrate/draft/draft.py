@@ -19,8 +19,8 @@ from bentwing.recording.topics import ENCODER_TYPES, IMU_TYPES, LIDAR_TYPES, can
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from bentwing.recording.containers.interface import Source
     from bentwing.recording.containers.scanned import TopicInfo
-    from bentwing.recording.containers.source import Source
     from bentwing.recording.payload import PayloadLike
     from bentwing.recording.sections.self_hits import SelfHit
 

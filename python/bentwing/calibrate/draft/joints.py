@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 from bentwing.recording.messages import wire
 
 if TYPE_CHECKING:
+    from bentwing.recording.containers.interface import Source
     from bentwing.recording.containers.scanned import TopicInfo
-    from bentwing.recording.containers.source import Source
 
 MIN_TRAVEL = 1.0  # of either unit, over the recording; a joint that holds its place makes less
 

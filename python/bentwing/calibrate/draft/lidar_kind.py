@@ -15,8 +15,8 @@ from bentwing.recording.messages.wire import BrokenMessageError
 from bentwing.recording.topics import OUSTER_TYPES
 
 if TYPE_CHECKING:
+    from bentwing.recording.containers.interface import Source
     from bentwing.recording.containers.scanned import TopicInfo
-    from bentwing.recording.containers.source import Source
     from bentwing.recording.lidar_kinds import LidarKind
     from bentwing.recording.messages.wire_scans import RawScan
 

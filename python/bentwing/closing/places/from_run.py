@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bentwing.base.errors import UsageError
-from bentwing.base.run_record import read_record
+from bentwing.base.run_record import finished_record
 from bentwing.base.trajectory import Trajectory, read_tum
 from bentwing.closing.places.cut import describe_parts
 from bentwing.closing.places.settings import PlaceSettings
@@ -69,7 +69,7 @@ def map_of_run(folder: Path) -> RunMap:
         If its trajectory cannot be read.
     """
     folder = Path(folder)
-    record = read_record(folder)
+    record = finished_record(folder)
     segments = [(float(a), float(b)) for a, b in record.get("segments") or []]
     begin = segments[0][0] if segments else 0.0
     path = next((p for s in MAP_SUFFIXES if (p := folder / f"map{s}").exists()), None)

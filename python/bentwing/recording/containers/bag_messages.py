@@ -11,6 +11,9 @@ import struct
 from typing import TYPE_CHECKING
 
 import numpy as np
+from rosbags.rosbag1.reader import decompressors
+
+from bentwing.recording.containers.decompress import decompressed, require_chunk
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -21,6 +24,8 @@ if TYPE_CHECKING:
 # The field of a record's header that tells its kind, with the length before it.
 _IS_MESSAGE, _IS_CONNECTION = b"\4\0\0\0op=\2", b"\4\0\0\0op=\7"
 _SIZE = struct.Struct("<I")
+# rosbags keeps the function only, which sets no bounds.
+_COMPRESSIONS = {function: name for name, function in decompressors.items()}
 
 
 def bag_messages(
@@ -49,13 +54,14 @@ def bag_messages(
 def _chunk(reader: Reader, position: int) -> bytes:
     """Return the decompressed records of the chunk at a position of the file."""
     size, start, decompress = reader.chunks[position]
+    require_chunk(size)
     with reader.path.open("rb") as file:
         file.seek(start)
         data = file.read(size)
     if len(data) != size:
         msg = f"{len(data)} of {size} bytes of a chunk"
         raise ValueError(msg)
-    return decompress(data)
+    return decompressed(_COMPRESSIONS[decompress], data)
 
 
 def _message(chunk: bytes, offset: int) -> bytes:

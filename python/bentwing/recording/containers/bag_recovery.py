@@ -11,9 +11,9 @@ from __future__ import annotations
 import struct
 from typing import TYPE_CHECKING
 
-from rosbags.rosbag1.reader import decompressors
 from rosbags.typesys.msg import normalize_msgtype
 
+from bentwing.recording.containers.decompress import MOST_OF_CHUNK, decompressed
 from bentwing.recording.containers.scanned import ScanEnd, ScannedMessage
 
 if TYPE_CHECKING:
@@ -48,6 +48,8 @@ def scan_bag(file: BinaryIO) -> Iterator[ScannedMessage | ScanEnd]:
             return
         # A damaged chunk fails in its decompressor, with an error of its own per compression.
         except (_CutError, struct.error, KeyError, ValueError, OSError, RuntimeError) as error:
+            if getattr(error, "errno", None) is not None:  # of the disk, not of what is on it
+                raise
             yield ScanEnd(f"cut off or damaged at byte {file.tell()} ({error})")
             return
         yield from sorted(messages, key=lambda message: message.stamp_ns)
@@ -67,6 +69,9 @@ def _read_record(file: BinaryIO) -> tuple[Fields, bytes, bool]:
         raise _CutError(msg)
     header = _fields(file.read(n))
     (n_data,) = struct.unpack("<I", file.read(4))
+    if n_data > MOST_OF_CHUNK:
+        msg = f"a record of {n_data} bytes"
+        raise _CutError(msg)
     data = file.read(n_data)
     return header, data, len(data) == n_data
 
@@ -99,7 +104,7 @@ def _messages_of(
     if not is_whole and compression != "none":
         msg = f"the last {compression} chunk is incomplete"
         raise _CutError(msg)
-    return _messages_in_chunk(decompressors[compression](data), connections)
+    return _messages_in_chunk(decompressed(compression, data), connections)
 
 
 def _messages_in_chunk(chunk: bytes, connections: Connections) -> list[ScannedMessage]:

@@ -11,9 +11,9 @@ import struct
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from rosbags.rosbag2.storage_mcap import DECOMPRESSORS
 from rosbags.typesys.msg import normalize_msgtype
 
+from bentwing.recording.containers.decompress import MOST_OF_CHUNK, decompressed
 from bentwing.recording.containers.scanned import ScanEnd, ScannedMessage
 
 if TYPE_CHECKING:
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
 MAGIC = b"\x89MCAP0\r\n"
 OP_FOOTER, OP_SCHEMA, OP_CHANNEL, OP_MESSAGE, OP_CHUNK, OP_DATA_END = 2, 3, 4, 5, 6, 15
-MAX_INFLATION = 1 << 32  # bytes; a chunk that claims more is damaged
 
 
 @dataclass(slots=True)
@@ -48,6 +47,8 @@ def scan_mcap(file: BinaryIO) -> Iterator[ScannedMessage | ScanEnd]:
             messages = _messages_of(operation, content, directory, is_whole=is_whole)
         # A damaged chunk fails in its decompressor, which promises no particular exception.
         except Exception as error:
+            if getattr(error, "errno", None) is not None:  # of the disk, not of what is on it
+                raise
             yield ScanEnd(f"damaged before byte {file.tell()} ({error})")
             return
         yield from sorted(messages, key=lambda message: message.stamp_ns)
@@ -62,7 +63,7 @@ def _read_record(file: BinaryIO) -> tuple[int, bytes, bool]:
     if len(head) < 9:
         return OP_CHUNK, b"", False
     (size,) = struct.unpack_from("<Q", head, 1)
-    if size > MAX_INFLATION:
+    if size > MOST_OF_CHUNK:
         msg = f"record of {size} bytes"
         raise ValueError(msg)
     content = file.read(size)
@@ -99,11 +100,8 @@ def _messages_in_cut_chunk(
 
 def _decompressed(content: bytes) -> bytes:
     _, _, size, _ = struct.unpack_from("<QQQI", content)
-    if size > MAX_INFLATION:
-        msg = f"chunk of {size} bytes"
-        raise ValueError(msg)
     compression, position = _string(content, 28)
-    return DECOMPRESSORS[compression](content[position + 8 :], size)
+    return decompressed(compression, content[position + 8 :], size)
 
 
 def _messages_in_chunk(chunk: bytes, directory: _Directory) -> list[ScannedMessage]:

@@ -6,14 +6,16 @@ from __future__ import annotations
 import heapq
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from bentwing.base.errors import RecordingError
 from bentwing.recording.containers.bag_messages import bag_messages
-from bentwing.recording.containers.bag_recovery import scan_bag
+from bentwing.recording.containers.bag_recovery import MAGIC, scan_bag
+from bentwing.recording.containers.decompress import bound_rosbags
 from bentwing.recording.containers.mcap_scan import scan_mcap
 from bentwing.recording.containers.pcap_scan import check_pcap, scan_pcap
 from bentwing.recording.containers.scanned import ScannedSource, TopicInfo
+from bentwing.recording.containers.unchanged import UnchangedSource, state_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Sequence
@@ -22,36 +24,15 @@ if TYPE_CHECKING:
     from rosbags.rosbag1 import Reader as Rosbag1Reader
     from rosbags.rosbag2 import Reader as Rosbag2Reader
 
+    from bentwing.recording.containers.interface import Source
+
     # Of some connections from a time on: connection, recorder's time and bytes.
     _Read = Callable[[Sequence[Connection], int | None], Iterator[tuple[Connection, int, bytes]]]
 
 PCAP_SUFFIXES = (".pcap", ".pcapng")
 SUFFIXES = (".bag", ".mcap", ".db3", *PCAP_SUFFIXES)
+_MOST_OF_METADATA = 2**24  # bytes
 EXPECTED = "give a ROS 1 .bag, a ROS 2 bag folder, a .db3, a .mcap or a .pcap file"
-
-
-class Source(Protocol):
-    """One or several files as one stream of raw messages.
-
-    `start_ns` and `end_ns` are on the recorder's clock; `cdr` tells ROS 2's encoding from ROS 1's.
-    """
-
-    topics: tuple[TopicInfo, ...]
-    start_ns: int
-    end_ns: int
-    cdr: bool
-
-    @property
-    def warnings(self) -> list[str]:
-        """Sentences about damage; grows while a damaged file is read."""
-
-    def messages(
-        self, topics: Collection[str], start_ns: int | None = None
-    ) -> Iterator[tuple[str, int, bytes]]:
-        """Yield (topic, recorder's time in ns, bytes) of the named topics in time order."""
-
-    def close(self) -> None:
-        """Close the files."""
 
 
 class RosbagsSource:
@@ -88,15 +69,23 @@ class RosbagsSource:
                 connection, stamp_ns, data = next(stream)
             except StopIteration:
                 return
+            except OSError as error:
+                if error.errno is not None:  # of the disk; some decompressors raise their own
+                    raise
+                self._note_damage(stamp_ns, error)
+                return
             # A damaged file makes the reader fail in many ways, none of which it promises.
             except Exception as error:
-                where = 0.0 if stamp_ns is None else (stamp_ns - self.start_ns) / 1e9
-                self.warnings.append(
-                    f"{self._path}: damaged {where:.1f} s after its start ({error}); "
-                    "the messages up to there are used"
-                )
+                self._note_damage(stamp_ns, error)
                 return
             yield connection.topic, stamp_ns, data
+
+    def _note_damage(self, stamp_ns: int | None, error: Exception) -> None:
+        where = 0.0 if stamp_ns is None else (stamp_ns - self.start_ns) / 1e9
+        self.warnings.append(
+            f"{self._path}: damaged {where:.1f} s after its start ({error}); "
+            "the messages up to there are used"
+        )
 
     def close(self) -> None:
         """Close the files."""
@@ -106,6 +95,7 @@ class RosbagsSource:
 def _ros1_reader(path: Path) -> tuple[Rosbag1Reader, _Read]:
     from rosbags.rosbag1 import Reader
 
+    _require_magic(path, MAGIC)
     reader = Reader(path)
     return reader, partial(bag_messages, reader)
 
@@ -113,8 +103,25 @@ def _ros1_reader(path: Path) -> tuple[Rosbag1Reader, _Read]:
 def _ros2_reader(path: Path) -> tuple[Rosbag2Reader, _Read]:
     from rosbags.rosbag2 import Reader  # slow to import, and no ROS 1 bag needs it
 
+    _require_described(path)
+    bound_rosbags()
     reader = Reader(path)
     return reader, reader.messages
+
+
+def _require_magic(path: Path, magic: bytes) -> None:
+    """Refuse another kind of file, which rosbags would search to its end for a line."""
+    with path.open("rb") as file:
+        if file.read(len(magic)) != magic:
+            msg = "it does not begin as such a file"
+            raise ValueError(msg)
+
+
+def _require_described(path: Path) -> None:
+    described = path / "metadata.yaml"
+    if described.is_file() and (size := described.stat().st_size) > _MOST_OF_METADATA:
+        msg = f"metadata.yaml of {size} bytes"
+        raise ValueError(msg)
 
 
 class MergedSource:
@@ -169,11 +176,13 @@ def open_source(paths: Sequence[Path]) -> Source:
     if not paths:
         msg = f"no recording given: {EXPECTED}"
         raise RecordingError(msg)
+    before = state_of(paths)
     files = [file for path in paths for file in _files(Path(path))]
     sources: list[Source] = []
     try:
         sources.extend(map(_open_one, files))
-        return sources[0] if len(sources) == 1 else MergedSource(sources)
+        source = sources[0] if len(sources) == 1 else MergedSource(sources)
+        return UnchangedSource(source, paths, before)
     except BaseException:
         for source in sources:
             source.close()
@@ -184,6 +193,9 @@ def _files(path: Path) -> list[Path]:
     """Return what to open for a path: itself, or the files of a folder without metadata."""
     if not path.exists():
         msg = f"{path}: no such file or folder; {EXPECTED}"
+        raise RecordingError(msg)
+    if not path.is_dir() and not path.is_file():
+        msg = f"{path}: is not a file; {EXPECTED}"
         raise RecordingError(msg)
     if not path.is_dir():
         return [path]

@@ -12,8 +12,8 @@ from bentwing.recording.packets.clock import PacketClock
 from bentwing.recording.peek import Peek, unreadable
 
 if TYPE_CHECKING:
+    from bentwing.recording.containers.interface import Source
     from bentwing.recording.containers.scanned import TopicInfo
-    from bentwing.recording.containers.source import Source
     from bentwing.recording.messages.wire_packets import Packet
     from bentwing.recording.packets.clock import ClockReading
     from bentwing.recording.packets.sensors import StampedPackets

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bentwing.recording.batches import LidarBatch
+    from bentwing.recording.containers.interface import Source
     from bentwing.recording.containers.scanned import TopicInfo
-    from bentwing.recording.containers.source import Source
     from bentwing.recording.sections.lidar import Lidar
 
 OUSTER_VERSION = "0.16.2"  # the newest whose wheels hold nothing but free software

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bentwing.base.run_record import read_record
+from bentwing.base.run_record import finished_record, understood
 from bentwing.base.trajectory import Trajectory, read_tum
 from bentwing.evaluate.surfels import Surfels, surfels_of_cloud
 from bentwing.map.formats import MAP_SUFFIXES
@@ -60,14 +60,17 @@ def read_contents(folder: Path, most: int, shown: Stage) -> Contents:
     Raises
     ------
     UsageError
-        If it is no run folder.
+        If it is no run folder, or the run is not complete.
     InputError
         If its trajectory or its map cannot be read.
     """
-    record = read_record(folder)
-    # Of a merged map the path of the first run is shown.
-    first = (record.get("runs") or [record])[0]
-    trajectory, origin_ns = trajectory_of(folder / first.get("trajectory", "trajectory.txt"), first)
+    record = finished_record(folder)
+    with understood(folder):
+        # Of a merged map the path of the first run is shown.
+        first = (record.get("runs") or [record])[0]
+        trajectory, origin_ns = trajectory_of(
+            folder / first.get("trajectory", "trajectory.txt"), first
+        )
     finest = Level(FINEST, most)
     surfels = surfels_of_cloud(
         _watched(map_of(folder), record, origin_ns, finest, shown), SURFEL_EDGE

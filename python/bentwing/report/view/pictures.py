@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bentwing.base.errors import InputError
-from bentwing.base.run_record import read_record
+from bentwing.base.run_record import finished_record
 from bentwing.base.trajectory import Trajectory
 from bentwing.map.epsg import epsg_of_map
 from bentwing.map.gps_time import adjusted_gps_origin
@@ -59,11 +59,11 @@ def read_pictured(run: Path, most: int = _MOST) -> Pictured:
     Raises
     ------
     UsageError
-        If it is no run folder.
+        If it is no run folder, or the run is not complete.
     InputError
         If it has no map, or its map or trajectory cannot be read.
     """
-    record = read_record(run)
+    record = finished_record(run)
     path = map_of(run)
     if path is None:
         msg = f"{run}: the run has no map; run `bentwing map` again, to its end"

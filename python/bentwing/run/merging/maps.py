@@ -4,13 +4,10 @@
 from __future__ import annotations
 
 from collections import Counter
-from contextlib import suppress
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from bentwing.base.errors import UsageError
-from bentwing.base.run_record import RECORD, read_record
+from bentwing.base.run_record import RUN_FOLDER
 from bentwing.base.trajectory import DT
 from bentwing.closing.global_registration import Recorded, register_jointly
 from bentwing.closing.global_registration.stretches import Stretches
@@ -26,6 +23,7 @@ from bentwing.run.report import report_run, say_warnings
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping, Sequence
+    from pathlib import Path
 
     from bentwing.base.estimate import Estimate
     from bentwing.base.progress import Progress
@@ -82,11 +80,11 @@ def make_maps(folder: RunFolder, groups: Sequence[Placed], found: Ingredients) -
     ----------
     groups : of parts that belong together
     """
+    _remove_earlier_maps(folder.path)
     if len(groups) > 1:
         maps = _separate_maps(folder, groups, found)
     else:
         maps = [_one_map(folder, groups[0], found, _describe(".", groups[0], found))]
-    _remove_earlier_maps(folder.path, {one.out.name for one in maps})
     return maps
 
 
@@ -147,20 +145,12 @@ def _separate_maps(
     return maps
 
 
-def _remove_earlier_maps(folder: Path, kept: set[str]) -> None:
+def _remove_earlier_maps(folder: Path) -> None:
     """Remove separate maps that an earlier merging has left in sub-folders."""
     for path in folder.glob("map_*"):
-        if path.name in kept or not path.is_dir():
-            continue
-        try:
-            record = read_record(path)
-        except UsageError:
-            continue
+        record = RUN_FOLDER.read(path) or {}
         if record.get("merging"):
-            for name in [*record.get("files", []), RECORD]:
-                (path / Path(name).name).unlink(missing_ok=True)
-            with suppress(OSError):  # what is not ours stays
-                path.rmdir()
+            RUN_FOLDER.remove(path)
 
 
 def _one_map(

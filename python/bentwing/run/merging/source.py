@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 from pydantic import ValidationError
 
 from bentwing.base.errors import InputError, UsageError
-from bentwing.base.provenance import describe_input
-from bentwing.base.run_record import read_record
+from bentwing.base.provenance import describe_input, files_of
+from bentwing.base.run_record import finished_record, understood
 from bentwing.recording import Payload, Recording
 from bentwing.recording.preprocess import RecordingPart
 from bentwing.run.run import estimate_of, require_single, verdict_in
@@ -111,13 +111,18 @@ def distinct_names(names: Sequence[str]) -> list[str]:
 
 def open_source(folder: Path, name: str) -> Source:
     """Read the run in a folder; see `open_sources`."""
-    record = require_single(folder, read_record(folder))
+    record = require_single(folder, finished_record(folder))
     if not record.get("recordings") or record.get("start_ns") is None:
         msg = (
             f"{folder}: run.json does not name the recording, as those of earlier versions; map it "
             "again"
         )
         raise UsageError(msg)
+    with understood(folder):
+        return _source(folder, name, record)
+
+
+def _source(folder: Path, name: str, record: dict[str, Any]) -> Source:
     recordings = [Path(path) for path in record["recordings"]]
     _require_unchanged(folder, recordings, record["inputs"])
     settings = record["settings"]
@@ -159,8 +164,7 @@ def _require_unchanged(
         raise InputError(msg)
     known = {(i["name"], i["bytes"], i["sha256"]) for i in inputs}
     for path in recordings:
-        files = sorted(path.rglob("*")) if path.is_dir() else [path]
-        for file in (file for file in files if file.is_file()):
+        for file in files_of(path):
             now = describe_input(file)
             if (now["name"], now["bytes"], now["sha256"]) not in known:
                 msg = (

@@ -17,12 +17,13 @@ from rosbags.rosbag2 import Writer as Ros2Writer
 from rosbags.typesys import Stores, get_typestore
 
 from bentwing.base.errors import PayloadError, UsageError
+from bentwing.base.staged_folder import staged_folder
 from bentwing.base.yaml_files import read_yaml
 from bentwing.simulate.faults.fault import Subject
 from bentwing.simulate.faults.messages import CLOUD, ENCODER, IMU, SCAN
 from bentwing.simulate.faults.registry import fault_of
 from bentwing.simulate.truth import write_yaml
-from bentwing.simulate.write import require_no_recording
+from bentwing.simulate.write import PAYLOAD, require_no_recording
 
 if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore
@@ -56,8 +57,15 @@ def with_fault(
         If there is no such fault, it cannot be put into this recording, or `out` has one already.
     """
     source, folder = Path(recording), Path(out)
-    target, described = _targets(source, folder)
+    require_no_recording(folder)
     content = _payload(Path(payload))
+    name = "recording.bag" if source.suffix == ".bag" else "recording"
+    with staged_folder(folder, name) as stage:
+        _write_all(source, content, fault, stage / name, seed)
+    return folder / name, folder / PAYLOAD
+
+
+def _write_all(source: Path, content: dict[str, Any], fault: str, target: Path, seed: int) -> None:
     store = get_typestore(Stores.ROS2_HUMBLE)
     with AnyReader([source], default_typestore=store) as reader:
         rng = np.random.default_rng([seed, *fault.encode()])
@@ -67,16 +75,8 @@ def with_fault(
         if changes.payload is not None:
             changes.payload(content)
         _rewrite(subject, changes, target)
-    write_yaml(described, content)
-    _copy_truth(source.parent, folder, fault)
-    return target, described
-
-
-def _targets(source: Path, out: Path) -> tuple[Path, Path]:
-    target = out / ("recording.bag" if source.suffix == ".bag" else "recording")
-    require_no_recording(out)
-    out.mkdir(parents=True, exist_ok=True)
-    return target, out / "payload.yaml"
+    write_yaml(target.parent / PAYLOAD, content)
+    _copy_truth(source.parent, target.parent, fault)
 
 
 def _payload(path: Path) -> dict[str, Any]:

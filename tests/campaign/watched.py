@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""Run the command in a process of its own, and say how it ended and what it took."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from pathlib import Path
+
+LONGEST = 600.0  # s; what is not done by then hangs
+
+
+@dataclass(frozen=True, slots=True)
+class Ended:
+    """How a command ended.
+
+    Attributes
+    ----------
+    code : exit code, negative for the signal that ended it, None where it had to be killed
+    said : what it wrote to both outputs
+    seconds : of wall time
+    peak_mb : most memory that it held
+    """
+
+    code: int | None
+    said: str
+    seconds: float
+    peak_mb: float
+
+
+def run(
+    arguments: Sequence[str | bytes | Path],
+    *,
+    meanwhile: Callable[[subprocess.Popen[bytes]], None] | None = None,
+    environment: dict[str, str] | None = None,
+    longest: float = LONGEST,
+) -> Ended:
+    """Run `bentwing` with these arguments.
+
+    Parameters
+    ----------
+    meanwhile : is called once the process has begun, to disturb it
+    environment : variables besides those of this process
+    """
+    with tempfile.TemporaryFile() as said:
+        started = time.monotonic()
+        process = subprocess.Popen(
+            [sys.executable, "-m", "bentwing", *arguments],
+            stdin=subprocess.DEVNULL,
+            stdout=said,
+            stderr=said,
+            env={**os.environ, **(environment or {})},
+            start_new_session=True,
+        )
+        if meanwhile is not None:
+            meanwhile(process)
+        status, peak = _wait(process, started + longest)
+        said.seek(0)
+        text = said.read().decode("utf-8", "replace")
+    code = None if status is None else os.waitstatus_to_exitcode(status)
+    return Ended(code, text, time.monotonic() - started, peak)
+
+
+def _wait(process: subprocess.Popen[bytes], until: float) -> tuple[int | None, float]:
+    """Return the status of a process and its peak in MB; kill it at the end of its time."""
+    while time.monotonic() < until:
+        pid, status, usage = os.wait4(process.pid, os.WNOHANG)
+        if pid:
+            process.returncode = os.waitstatus_to_exitcode(status)
+            return status, usage.ru_maxrss / 1024
+        time.sleep(0.02)
+    process.send_signal(signal.SIGKILL)
+    _, _, usage = os.wait4(process.pid, 0)
+    process.returncode = -signal.SIGKILL
+    return None, usage.ru_maxrss / 1024

@@ -94,6 +94,10 @@ test-python: $(CORE) ## the package's fast tests
 test-all: test-rust $(CORE) ## also the slow ones
 	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile -m "slow or not slow"
 
+.PHONY: campaign
+campaign: $(CORE) ## commands with faulty inputs and stops, each in a process that is measured
+	$(BIN)/python -m pytest -m "slow or not slow" tests/campaign -v
+
 ##@ Look after the code
 
 .PHONY: fmt

@@ -3,14 +3,17 @@
 
 from __future__ import annotations
 
-import fcntl
 import json
 import os
 import platform
+import sys
 from datetime import datetime, timezone
 from typing import TYPE_CHECKING
 
 from bentwing.base.errors import UsageError
+
+if sys.platform != "win32":
+    import fcntl
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -59,6 +62,8 @@ class FolderLock:
             self._descriptor = None
 
     def _lock(self, descriptor: int) -> None:
+        if sys.platform == "win32":  # what the file says is all there is
+            return
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:

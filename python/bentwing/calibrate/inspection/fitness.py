@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 Stretch = tuple[float, float]
 MIN_IMU_RATE_HZ = 90.0
+USABLE_IMU_RATE_HZ = 4.0  # with less, every sample is behind a break
 ALWAYS_LEVEL = 0.95  # share of time
 
 
@@ -78,6 +79,8 @@ def judge(recording: Recording, *, has_payload: bool) -> Judgement:
     defects += _mount_defects(recording, has_payload=has_payload)
     warnings: list[str] = []
     static, scale = None, 1.0
+    if len(imu.times) and _rate_hz(imu.times) < USABLE_IMU_RATE_HZ:
+        return Judgement([*defects, _too_slow(recording, imu)], warnings, static, scale)
     if len(imu.times):
         judged = imu.beginning
         units = None if recording.payload.imu is None else recording.payload.imu.units
@@ -113,10 +116,21 @@ def _time_defects(recording: Recording) -> list[str]:
     )
 
 
+def _rate_hz(times: NDArray[np.float64]) -> float:
+    return 0.0 if len(times) < 2 else 1.0 / max(float(np.median(np.diff(times))), 1e-9)
+
+
+def _too_slow(recording: Recording, imu: _Imu) -> str:
+    n, rate_hz = len(imu.times), _rate_hz(imu.times)
+    found = f"{rate_hz:.1f} Hz" if rate_hz else f"{n} message{'s'[: n != 1]} only"
+    return (
+        f"{recording.imu_topic}: {found}, and between the samples nothing tells how the head moves; "
+        "set the IMU to 100 Hz or more"
+    )
+
+
 def _imu_rate(recording: Recording, times: NDArray[np.float64]) -> list[str]:
-    if len(times) < 2:
-        return []
-    rate_hz = 1.0 / max(float(np.median(np.diff(times))), 1e-9)
+    rate_hz = _rate_hz(times)
     if rate_hz >= MIN_IMU_RATE_HZ:
         return []
     return [

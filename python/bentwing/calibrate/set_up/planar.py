@@ -15,6 +15,7 @@ import numpy as np
 from bentwing.calibrate.set_up import axes, edits
 from bentwing.calibrate.set_up.crossings import Crossings, Reading
 from bentwing.calibrate.set_up.errors import NotFoundError
+from bentwing.calibrate.set_up.mirrors import both_meanings
 from bentwing.calibrate.set_up.noise import ImuNoise
 from bentwing.calibrate.set_up.returns import NEARBY, delays_by_returns
 from bentwing.calibrate.set_up.scans import Scans
@@ -38,16 +39,6 @@ TELLING = 0.02
 _ALIKE = (
     "what the lidar sees fits together in any mount: record where there are walls and corners within "
     "its reach"
-)
-_POINT = (
-    "either the lidar is mounted with half a turn about the normal of its scan plane, or all axes of the "
-    "accelerometer are negated; a 2D lidar sees both alike: turn T_imu_lidar, or write imu: "
-    "{axes: [-x, -y, -z], gyro_axes: [x, y, z]}"
-)
-_PLANE = (
-    "either all axes of the gyro are negated, or the axis of the IMU across the scan plane of the lidar "
-    "is; a 2D lidar sees both alike: write imu: {gyro_axes: [-x, -y, -z]}, or that axis negated in imu: "
-    "{axes: [x, y, z]}"
 )
 
 
@@ -87,7 +78,8 @@ def describe_by_trials(
             return found
         for gyro, accel in descriptions.of_axes(described):
             if found := trials.at_a_glance(edits.with_axes(likely, gyro, accel)):
-                _require_one_meaning(gyro, accel)
+                if doubt := both_meanings(gyro, accel, described):
+                    raise NotFoundError(doubt)
                 return found
     others = itertools.chain(descriptions.of_mounts(), delayed[LIKELY:])
     if found := _first(trials.at_a_glance(other) for other in others):
@@ -167,19 +159,6 @@ class _Descriptions:
         for misfit, R in self._mounts:
             if misfit <= self._most:
                 yield edits.with_rotation(described, hand * gyro @ R)
-
-
-def _require_one_meaning(gyro: NDArray[np.float64], accel: NDArray[np.float64]) -> None:
-    """Refuse axes with which a 2D lidar sees the mirror image of another set-up.
-
-    A plane is its own mirror image. So a world that is mirrored at a point looks the same to a scanner
-    that is turned by half a turn about the normal of its scans, and one that is mirrored at the plane to
-    the scanner as it is; the IMU feels a negated force in the one, and a negated turn in the other.
-    """
-    if np.array_equal(accel, -np.eye(3)) and np.array_equal(gyro, np.eye(3)):
-        raise NotFoundError(_POINT)
-    if np.array_equal(gyro, -np.eye(3)) and np.array_equal(accel, np.eye(3)):
-        raise NotFoundError(_PLANE)
 
 
 def _ranked_axes(imu: ImuBatch) -> list[NDArray[np.float64]]:

@@ -126,8 +126,7 @@ class Continuous(Estimator):
             if now.windows and now.length >= shift:
                 passes.append(now)
         if not passes:
-            msg = f"less than {shift:g} s of lidar points; nothing can be estimated"
-            raise NotEnoughDataError(msg)
+            raise NotEnoughDataError(_too_short(shift, self._breaks))
         return self._estimate(passes, self._breaks, self._first_turn)
 
     @property
@@ -245,3 +244,13 @@ def _new_data(phase: Begun) -> float:
     now = phase.under_way
     guessed = now.is_settling or isinstance(phase, Bridging)
     return now.settings.shift / (CAREFUL_STEPS if guessed else 1)
+
+
+def _too_short(least: float, breaks: list[Break]) -> str:
+    if not breaks:
+        return f"less than {least:g} s of lidar points; nothing can be estimated"
+    first = breaks[0]
+    return (
+        f"no stretch of {least:g} s without a break, so that nothing can be estimated: {len(breaks)} "
+        f"breaks, the first of the {first.sensor} data from {first.start:.2f} to {first.stop:.2f} s"
+    )

@@ -152,7 +152,7 @@ def _std_of_mean(
     of samples. A bias walking for T seconds ends bias_walk·√(T/3) from its mean.
     """
     duration = float(times[-1] - times[0])
-    n_blocks = max(2, int(duration / BLOCK))
+    n_blocks = min(max(2, int(duration / BLOCK)), len(values))
     means = np.array([block.mean(axis=0) for block in np.array_split(values, n_blocks)])
     white = values.std(axis=0, ddof=1) / np.sqrt(len(values))
     blocked = means.std(axis=0, ddof=1) / np.sqrt(n_blocks)

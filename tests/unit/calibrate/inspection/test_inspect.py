@@ -71,6 +71,18 @@ def test_a_start_in_motion_is_a_warning_not_a_defect(tmp_path, ros1, head_entrie
     assert any("no static start" in text for text in found.warnings)
 
 
+@pytest.mark.parametrize(
+    ("every", "found"), [(10_000, "1 message only"), (40, "2.5 Hz")], ids=["one", "slow"]
+)
+def test_an_imu_that_says_next_to_nothing_is_a_defect(tmp_path, ros1, every, found):
+    entries = with_rest(ros1)
+    imu = [entry for entry in entries if entry[0] == "/imu"]
+    rest = [entry for entry in entries if entry[0] != "/imu"]
+    recording = ros1.write(tmp_path / "few.bag", [*imu[::every], *rest])
+    defects = inspect([recording]).defects
+    assert any(f"/imu: {found}" in defect for defect in defects)
+
+
 def test_a_level_2d_lidar_cannot_make_a_3d_map(tmp_path, ros1):
     found = inspect(ros1.write(tmp_path / "a.bag", level_robot(ros1)), HEAD)
     (defect,) = found.defects

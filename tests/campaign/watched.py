@@ -10,11 +10,11 @@ import sys
 import tempfile
 import time
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
-    from pathlib import Path
 
 LONGEST = 600.0  # s; what is not done by then hangs
 
@@ -72,13 +72,25 @@ def run(
 
 def _wait(process: subprocess.Popen[bytes], until: float) -> tuple[int | None, float]:
     """Return the status of a process and its peak in MB; kill it at the end of its time."""
+    peak = 0.0
     while time.monotonic() < until:
-        pid, status, usage = os.wait4(process.pid, os.WNOHANG)
+        peak = max(peak, _peak_mb(process.pid))
+        pid, status = os.waitpid(process.pid, os.WNOHANG)
         if pid:
             process.returncode = os.waitstatus_to_exitcode(status)
-            return status, usage.ru_maxrss / 1024
+            return status, peak
         time.sleep(0.02)
     process.send_signal(signal.SIGKILL)
-    _, _, usage = os.wait4(process.pid, 0)
+    os.waitpid(process.pid, 0)
     process.returncode = -signal.SIGKILL
-    return None, usage.ru_maxrss / 1024
+    return None, peak
+
+
+def _peak_mb(pid: int) -> float:
+    """Return the most memory that a process has held so far; what `wait4` says counts its parent's."""
+    try:
+        status = Path(f"/proc/{pid}/status").read_text(encoding="utf-8")
+    except OSError:
+        return 0.0
+    peaks = [line.split()[1] for line in status.splitlines() if line.startswith("VmHWM:")]
+    return float(peaks[0]) / 1024 if peaks else 0.0

@@ -252,7 +252,7 @@ MOTOR = Payload.model_validate({"encoder": {}})
         ({"payload": 3}, TypeError, "payload: expected a Payload, got int; give the path"),
         ({"calibration": {}}, TypeError, "calibration: expected a Calibration, got dict"),
         ({"settings": {}}, TypeError, "settings: expected a ContinuousSettings, got dict; make"),
-        ({"threads": 0}, ValueError, "threads: expected a number from 1 on, or None"),
+        ({"threads": 0}, ValueError, "threads: expected a number from 1 to 1024, or None"),
         ({"threads": "all"}, TypeError, "threads: expected an int, got str"),
     ],
 )

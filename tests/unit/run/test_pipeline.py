@@ -129,7 +129,8 @@ def test_a_run_leaves_all_files_of_the_contract(tmp_path, recording):
     assert record["complete"] is True
     assert record["counts"]["map.points"] == record["counts"]["lidar.points"] == 10_000
     assert record["warnings"] == ["/imu: a gap of 0.2 s", "one plane only at 3 s"]
-    assert set(record["timings"]) == {"inputs", "estimate", "loops", "map", "report", "total"}
+    stages = {"inputs", "estimate", "beams", "loops", "map", "report", "total"}
+    assert set(record["timings"]) == stages
     assert run.verdict.state == record["verdict"]["state"] == "failed"
     reasons = [reason["sentence"] for reason in record["verdict"]["reasons"]]
     assert any("the accelerations are all zero" in reason for reason in reasons)

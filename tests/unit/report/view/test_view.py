@@ -72,16 +72,18 @@ def run_folder(path, *, wkt=None, shift=(0.0, 0.0, 0.0)):
     """A run whose map is a box, in local or in projected coordinates."""
     points, times = box(40_000)
     way = np.column_stack([np.linspace(1, 5, 100), np.linspace(1, 3, 100), np.full(100, 1.5)])
-    with RunFolder(path) as folder, open_map(folder.file("map.las"), "las", 10**18) as writer:
-        writer.write(MapChunk(points + shift, times, np.ones(len(times), np.float32)))
+    with RunFolder(path) as folder:
+        written = folder.file("map.las")
+        with open_map(written, "las", 10**18) as writer:
+            writer.write(MapChunk(points + shift, times, np.ones(len(times), np.float32)))
         trajectory = Trajectory(
             np.linspace(0, 9, 100), way + shift, np.tile([0.0, 0, 0, 1], (100, 1))
         )
         trajectory.write_tum(folder.file("trajectory.txt"), 10**18)
-    if wkt is not None:
-        las = laspy.read(path / "map.las")
-        las.header.vlrs.append(laspy.vlrs.known.WktCoordinateSystemVlr(wkt))
-        las.write(path / "map.las")
+        if wkt is not None:
+            las = laspy.read(written)
+            las.header.vlrs.append(laspy.vlrs.known.WktCoordinateSystemVlr(wkt))
+            las.write(written)
     return path
 
 

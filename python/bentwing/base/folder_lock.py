@@ -7,6 +7,7 @@ import json
 import os
 import platform
 import sys
+from contextlib import suppress
 from datetime import datetime, timezone
 from typing import TYPE_CHECKING
 
@@ -43,7 +44,7 @@ class FolderLock:
             Another process has it, which is named with its host.
         """
         while self._descriptor is None:
-            descriptor = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+            descriptor = os.open(self._path, os.O_RDWR | os.O_CREAT, 0o644)
             try:
                 self._lock(descriptor)
                 if _is_file(self._path, descriptor):  # its last holder may just have removed it
@@ -57,12 +58,17 @@ class FolderLock:
     def release(self) -> None:
         """Give the lock back and remove its file."""
         if self._descriptor is not None:
-            self._path.unlink(missing_ok=True)
+            with suppress(
+                PermissionError
+            ):  # Windows removes no open file; one of this host is taken over
+                self._path.unlink(missing_ok=True)
             os.close(self._descriptor)
             self._descriptor = None
 
     def _lock(self, descriptor: int) -> None:
-        if sys.platform == "win32":  # what the file says is all there is
+        if (
+            sys.platform == "win32"
+        ):  # it has no flock: only other hosts are kept out, by what the file says
             return
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -98,7 +104,8 @@ def _is_file(path: Path, descriptor: int) -> bool:
 
 def _holder(descriptor: int) -> dict[str, str]:
     try:
-        found = json.loads(os.pread(descriptor, _MOST, 0))
+        os.lseek(descriptor, 0, os.SEEK_SET)
+        found = json.loads(os.read(descriptor, _MOST))
     except (OSError, ValueError, RecursionError):
         return {}
     return {str(k): str(v) for k, v in found.items()} if isinstance(found, dict) else {}
@@ -108,4 +115,5 @@ def _write_holder(descriptor: int) -> None:
     since = datetime.now(timezone.utc).isoformat(timespec="seconds")
     holder = {"process": os.getpid(), "host": platform.node(), "since": since}
     os.ftruncate(descriptor, 0)
-    os.pwrite(descriptor, json.dumps(holder).encode(), 0)
+    os.lseek(descriptor, 0, os.SEEK_SET)
+    os.write(descriptor, json.dumps(holder).encode())

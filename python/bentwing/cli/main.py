@@ -67,8 +67,9 @@ def _options(
 def run() -> None:
     """Run the command line and end the process with its exit code."""
     # Whoever ends the process finds the reason in the record, as after Ctrl-C.
-    for number in (signal.SIGTERM, signal.SIGHUP):
-        if signal.getsignal(number) is signal.SIG_DFL:
+    for name in ("SIGTERM", "SIGHUP"):
+        number = getattr(signal, name, None)  # Windows has no SIGHUP
+        if number is not None and signal.getsignal(number) is signal.SIG_DFL:
             signal.signal(number, _interrupt)
     sys.exit(run_command(sys.argv[1:]))
 

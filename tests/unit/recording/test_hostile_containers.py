@@ -4,16 +4,19 @@
 import bz2
 import resource
 import struct
+import sys
 
 import pytest
 
 from bentwing.base.errors import InputError, RecordingError
 from bentwing.base.yaml_files import read_yaml
-from bentwing.recording.containers import decompress
 from bentwing.recording.containers.decompress import decompressed
 from bentwing.recording.containers.source import open_source
 
-zstd = decompress.storage_mcap.zstd
+if sys.version_info >= (3, 14):
+    from compression import zstd
+else:
+    from backports import zstd
 
 
 def field(name, value):

@@ -7,10 +7,8 @@ A few kilobytes can decompress to gigabytes, so the libraries are asked for a bo
 from __future__ import annotations
 
 import bz2
+import sys
 from typing import TYPE_CHECKING, Any
-
-from lz4.frame import LZ4FrameDecompressor  # type: ignore[import-untyped]
-from rosbags.rosbag2 import storage_mcap
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -58,15 +56,30 @@ def decompressed(compression: str, data: bytes, size: int = MOST_OF_CHUNK) -> by
     return found
 
 
+def _lz4() -> Any:  # noqa: ANN401 - untyped
+    from lz4.frame import LZ4FrameDecompressor  # type: ignore[import-untyped]
+
+    return LZ4FrameDecompressor()
+
+
+def _zstd() -> Any:  # noqa: ANN401 - one of two modules
+    if sys.version_info >= (3, 14):
+        from compression import zstd
+    else:
+        from backports import zstd
+    return zstd.ZstdDecompressor()
+
+
 _DECOMPRESSORS: dict[str, Callable[[], Any]] = {
     "bz2": bz2.BZ2Decompressor,
-    "lz4": LZ4FrameDecompressor,
-    "zstd": storage_mcap.zstd.ZstdDecompressor,  # type: ignore[attr-defined] # whichever it has
+    "lz4": _lz4,
+    "zstd": _zstd,
 }
 
 
 def bound_rosbags() -> None:
     """Let rosbags decompress the chunks of MCAP files by `decompressed`: it sets no bounds itself."""
+    from rosbags.rosbag2 import storage_mcap  # slow to import, and no ROS 1 bag needs it
 
     def bounded(compression: str) -> Callable[[bytes, int], bytes]:
         return lambda data, size: decompressed(compression, data, size)

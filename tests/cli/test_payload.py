@@ -180,6 +180,24 @@ def test_map_writes_the_head_as_the_run_has_found_it(bentwing, office, tmp_path)
     assert set(found.calibration.std) == {"latency", "extrinsic_rotation", "extrinsic_translation"}
 
 
+@pytest.mark.slow
+def test_what_map_writes_of_a_head_it_had_to_find_needs_no_repair(bentwing, office, tmp_path):
+    bag, path = office / "recording.bag", tmp_path / "found.yaml"
+    fast = ("--no-loop-closure", "--map-spacing", 0.2)
+    said = bentwing("map", bag, "-o", tmp_path / "first", *fast, "--write-payload", path)
+    assert said.code == 0, said.err
+    found = Payload.load(path)
+    assert found.imu.topic
+    assert found.places_lidar_on_imu
+    said = bentwing("map", bag, "-p", path, "-o", tmp_path / "second", *fast)
+    assert said.code == 0, said.err
+    first, second = (
+        json.loads((tmp_path / run / "run.json").read_text()) for run in ("first", "second")
+    )
+    assert first["set_up"]
+    assert not second["set_up"]
+
+
 def test_several_flights_have_no_one_payload(bentwing, office, tmp_path, changed_bag):
     bag = office / "recording.bag"
     later = changed_bag(lambda _, t, message: [(t + 500.0, message)], until=2.0)

@@ -101,9 +101,6 @@ def command(
         say_maps(merged, quiet=quiet)
         return
     found = run_recording(recording, out, chosen, payload, resume=resume, progress=progress)
-    if write_payload is not None and found.estimate is not None:
-        payload_found = (
-            chosen.payload if found.beams is None else found.beams.in_payload(chosen.payload)
-        )
-        with_motion(payload_found, found.estimate.calibration).save(write_payload)
+    if write_payload is not None and found.estimate is not None and found.payload is not None:
+        with_motion(found.payload, found.estimate.calibration).save(write_payload)
     say_run(out, found.verdict, quiet=quiet)

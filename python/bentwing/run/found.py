@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from bentwing.evaluate.expected import ExpectedAccuracy
     from bentwing.evaluate.revisits import Revisits
     from bentwing.evaluate.verdict import Evidence, Reason
-    from bentwing.recording import Batch
+    from bentwing.recording import Batch, Payload
 
     Placed: TypeAlias = Georeferenced | GivenCoordinates
     Record: TypeAlias = Mapping[str, Any]
@@ -112,6 +112,7 @@ class Found:
     judged : of a merged map, what speaks against the runs in it
     set_up : the head as the recording shows it, where that is other than the payload says
     beams : by how much the lidar's beams are off, where that was found; it is taken out
+    payload : by which the recording was read in the end, what was found of the head included
     doubt : why the estimate was stopped before its end
     failure : why the last stage did not finish
     """
@@ -131,6 +132,7 @@ class Found:
     judged: tuple[Reason, ...] = ()
     set_up: SetUp | None = None
     beams: FoundBeams | None = None
+    payload: Payload | None = None
     doubt: Verdict | None = None
     failure: BaseException | None = None
 

@@ -157,7 +157,7 @@ def run_recording(
             found = _keep(job, stages.make_map(job, found))
             report_run(folder, found)
             checkpoint.discard()
-    return found
+    return replace(found, payload=head.settings.payload)
 
 
 def _open_inputs(job: stages.Job, payload_file: Path | str | None) -> PriorMap | None:

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from functools import cache
 from typing import TYPE_CHECKING
 
 from bentwing.base.mount import FixedMount
@@ -38,6 +37,7 @@ class Trials:
     ) -> None:
         self._stretch, self._noise, self._threads = stretch, noise, threads
         self._has_mount = has_mount
+        self._known: dict[tuple[str, float, float], Trial] = {}
         self._best: Trial | None = None
         self._refused: list[Refinement] = []
 
@@ -79,13 +79,12 @@ class Trials:
         ------
         DefectError
         """
-
-        @cache
-        def tried(scale: float) -> Trial:
-            scaled = edits.with_lidar(payload, range_scale=payload.lidar.range_scale / scale)
-            return self._tried(scaled, AS_DESCRIBED, TRIED)
-
-        require_scale_of_ranges(tried)
+        scale_of = payload.lidar.range_scale
+        require_scale_of_ranges(
+            lambda scale: self._tried(
+                edits.with_lidar(payload, range_scale=scale_of / scale), AS_DESCRIBED, TRIED
+            )
+        )
 
     def require_scale_in_what_was_refused(self) -> None:
         """Refuse ranges with a wrong scale, where only that contradicts the best of what was tried for long.
@@ -138,6 +137,13 @@ class Trials:
         return edits.with_latency(placed, trial.calibration.source_latency)
 
     def _tried(self, payload: Payload, rotation: float, length: float) -> Trial:
+        key = (payload.model_dump_json(), rotation, length)
+        if key not in self._known:
+            self._known[key] = self._with(payload, rotation, length)
+            self._note(self._known[key])
+        return self._known[key]
+
+    def _with(self, payload: Payload, rotation: float, length: float) -> Trial:
         wide = edits.with_std(
             self._noise.at_least_in(payload),
             extrinsic_rotation=rotation,
@@ -146,9 +152,7 @@ class Trials:
         )
         read = self._stretch.read_as(wide)
         start, _ = richest(read.imu, TRIED)
-        trial = try_payload(read.part(start, start + length), wide, self._threads)
-        self._note(trial)
-        return trial
+        return try_payload(read.part(start, start + length), wide, self._threads)
 
     def _note(self, trial: Trial) -> None:
         if self._best is None or trial.score > self._best.score:

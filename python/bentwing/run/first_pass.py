@@ -36,7 +36,15 @@ _OF_HEAD = frozenset(
     )
 )
 _OF_SAMPLES = frozenset(
-    ("constant", "repeated", "gyro_limit", "accelerometer_limit", "even_ranges", "scatter")
+    (
+        "constant",
+        "repeated",
+        "gyro_limit",
+        "accelerometer_limit",
+        "even_ranges",
+        "scatter",
+        "point_order",
+    )
 )
 
 

@@ -74,11 +74,11 @@ def _has_moved(trajectory: Trajectory) -> bool:
 
 def _judge_samples(watch: Watch) -> list[Evidence]:
     found = [] if not watch.imu.n else [*_judge_imu(watch.imu), *_judge_units(watch.track)]
-    spread = watch.returns.spread
+    returns = watch.returns
     return [
         *found,
-        Evidence("even_ranges", 1.0 / max(spread, 1e-3)),
-        Evidence("scatter", watch.returns.scatter),
+        Evidence("even_ranges", 1.0 / max(returns.spread, 1e-3)),
+        Evidence("point_order" if returns.is_out_of_order else "scatter", returns.scatter),
     ]
 
 

@@ -92,6 +92,12 @@ KINDS: dict[str, Kind] = {
         "neighbouring returns of the lidar have ranges without relation: it saw no surfaces",
         "check the lidar, its driver, and whether points and times belong together",
     ),
+    "point_order": Kind(
+        3, 0.2, 0.4,
+        "the points of a scan are not in the order of their times: neighbouring directions show one "
+        "surface, successive points do not",
+        "let the driver write each point with the time at which it was measured",
+    ),
     "slice": Kind(
         3, 0.95, 0.985,
         "the plane of the 2D lidar stays the same: the map is one slice of the surroundings",
@@ -135,7 +141,7 @@ KINDS: dict[str, Kind] = {
         "check the unit and the scale of both",
     ),
     "accelerometer": Kind(
-        8, 0.5, 3.0,
+        8, 0.8, 3.0,
         "the trajectory moves otherwise than the accelerometer says, by {force:.2f} m/s²{when}",
         "check the accelerometer's axes and scale, and the unit of the ranges",
     ),

@@ -22,6 +22,9 @@ _FEWEST = 3
 # Neighbours are looked at in one of so many batches, so many returns of it.
 _LOOKS, _LOOKED, _MOST = 10, 4000, 500
 _FEWEST_STEPS = 20
+# Between successive returns, as a logarithm; then those in neighbouring directions are looked at, too.
+_UNRELATED = 0.1
+_AGREE = 0.3  # of what successive returns differ by
 # A return whose neighbour is known by no beam number has it one of so many returns before.
 _STRIDES = (1, 2, 4, 6, 8, 16, 32, 64, 128)
 
@@ -41,6 +44,7 @@ class Returns:
         self._sums = np.zeros(2)
         self._n_batches = 0
         self._steps: list[float] = []
+        self._aside: list[float] = []
 
     def add(self, batch: LidarBatch) -> None:
         """Take the next returns."""
@@ -67,8 +71,15 @@ class Returns:
         """How far a return's range usually is from its neighbour's, as a logarithm; zero without returns."""
         return float(np.median(self._steps)) if self._steps else 0.0
 
+    @property
+    def is_out_of_order(self) -> bool:
+        """Whether ranges agree in neighbouring directions, but not those of successive returns."""
+        return bool(self._aside) and float(np.median(self._aside)) < _AGREE * self.scatter
+
     def _look(self, batch: LidarBatch) -> None:
-        logs = np.log(np.maximum(np.linalg.norm(batch.points[:_LOOKED], axis=1), 1e-3))
+        points = batch.points[:_LOOKED]
+        ranges = np.maximum(np.linalg.norm(points, axis=1), 1e-3)
+        logs = np.log(ranges)
         if batch.ring is not None:
             rings = batch.ring[:_LOOKED]
             beams, counts = np.unique(rings, return_counts=True)
@@ -77,6 +88,8 @@ class Returns:
             steps = [_step(logs, stride) for stride in _STRIDES]
         if known := [step for step in steps if step is not None]:
             self._steps.append(min(known))
+            if min(known) > _UNRELATED:
+                self._aside.append(_step_aside(points / ranges[:, None], logs))
 
     def _judge(self, points: NDArray[np.float64]) -> None:
         self._n_judged += 1
@@ -91,3 +104,12 @@ def _step(logs: NDArray[np.float64], stride: int) -> float | None:
     if len(logs) < stride + _FEWEST_STEPS:
         return None
     return float(np.median(np.abs(logs[stride:] - logs[:-stride])))
+
+
+def _step_aside(directions: NDArray[np.float64], logs: NDArray[np.float64]) -> float:
+    """Median step from ranges (N,), as logarithms, to those in the nearest directions (N, 3)."""
+    # Slow to import, and needed for recordings that are wrong only.
+    from scipy.spatial import cKDTree
+
+    _, nearest = cKDTree(directions).query(directions, k=2)
+    return float(np.median(np.abs(logs[nearest[:, 1]] - logs)))

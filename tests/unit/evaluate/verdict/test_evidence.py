@@ -263,9 +263,17 @@ def test_returns_at_one_range_are_no_surroundings():
 @pytest.mark.parametrize("rings", [None, np.tile(np.arange(16, dtype=np.uint16), 250)])
 def test_returns_without_relation_are_no_surfaces(rings):
     watch, points = Watch(), room().points
+    lengths = np.random.default_rng(1).uniform(0.1, 3.0, (len(points), 1))
+    watch.add(LidarBatch(lengths * points, np.zeros(4000), ring=rings))
+    assert kinds(estimate(), watch) == {"scatter"}
+
+
+@pytest.mark.parametrize("rings", [None, np.tile(np.arange(16, dtype=np.uint16), 250)])
+def test_points_with_the_times_of_others_are_out_of_order(rings):
+    watch, points = Watch(), room().points
     order = np.random.default_rng(1).permutation(len(points))
     watch.add(LidarBatch(points[order], np.zeros(4000), ring=rings))
-    assert kinds(estimate(), watch) == {"scatter"}
+    assert kinds(estimate(), watch) == {"point_order"}
 
 
 def test_beams_in_turn_are_compared_with_themselves():

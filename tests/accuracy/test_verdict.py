@@ -11,13 +11,13 @@ from bentwing.simulate.faults import with_fault
 # With the kind of evidence that speaks for the cause, of several the first.
 FAULTS = {
     "mount-90-x": {"matches", "lost"},
-    "mount-wxyz": {"matches", "lost"},
+    "mount-wxyz": {"matches", "lost", "accelerometer"},
     "gyro-swapped": {"matches", "lost"},
     "gyro-zero": {"constant"},
-    "gyro-1.2": {"matches", "lost"},
+    "gyro-1.2": {"matches", "lost", "calibration"},
     "accel-swapped": {"accelerometer"},
     "imu-frozen": {"repeated"},
-    "imu-10hz": {"imu_period", "lost"},
+    "imu-10hz": {"imu_period"},
     "elevator": {"accelerometer"},
     "lidar-late-0.5": {"matches"},
     "ranges-1.3": {"scale"},

@@ -11,6 +11,7 @@ from bentwing.cli import options
 EXAMPLES = (
     "bentwing merge morning noon evening -o site",
     "bentwing merge morning noon -o site --map-format e57 --map-spacing 0.02",
+    "bentwing merge morning noon -o site --epsg 25832 --control-points marks.csv",
 )
 
 
@@ -29,16 +30,21 @@ def command(
     map_spacing: options.Spacing = None,
     keep_moving: options.KeepMoving = False,
     keep_mixed: options.KeepMixed = False,
+    georeference: options.Georeference = None,
+    epsg: options.Epsg = None,
+    control_points: options.ControlPoints = None,
     threads: options.Threads = None,
     quiet: options.Quiet = False,
 ) -> None:
     """Put several runs into one map, without a guess of their relative poses.
 
-    Runs that have no place in common become maps of their own, in folders of their own.
+    Runs that have no place in common become maps of their own, in folders of their own. The GNSS fixes
+    of all runs put a map on the Earth together; coordinates are those of the runs unless said otherwise.
     """
     # slow to import, so only when it is needed
     from bentwing.base.progress import create_progress
     from bentwing.cli.done import say_maps
+    from bentwing.closing.georeference.settings import GeoreferenceSettings
     from bentwing.map.clean import CleanSettings
     from bentwing.run.choose import given
     from bentwing.run.merging import merge
@@ -47,6 +53,9 @@ def command(
         runs,
         out,
         **given(map_format=map_format, map_spacing=map_spacing),
+        georeferencing=GeoreferenceSettings(
+            **given(mode=georeference, epsg=epsg, control_points=control_points)
+        ),
         cleaning=CleanSettings(**options.cleaning(keep_mixed=keep_mixed, keep_moving=keep_moving)),
         threads=threads,
         progress=create_progress(quiet=quiet),

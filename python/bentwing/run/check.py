@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from bentwing.base.progress import Progress
+    from bentwing.closing.georeference.settings import GeoreferenceSettings
     from bentwing.recording import Recording
     from bentwing.run.settings import RunSettings
 
@@ -33,32 +34,38 @@ def opened(
     UsageError, InputError
         A setting or a file that it names cannot be used, or has no effect on this recording.
     """
-    _require_coordinates(settings)
+    require_coordinates(settings.georeferencing)
     with Head(paths, settings, progress) as head:
-        _require_effect(head.recording, settings)
+        recording = head.recording
+        require_effect(settings.georeferencing, recording.paths[0], is_placed=recording.has_fixes)
         _require_part(head.recording, settings.start)
         head.require_fit()
         yield head
 
 
-def _require_coordinates(settings: RunSettings) -> None:
-    wanted = settings.georeferencing
+def require_coordinates(wanted: GeoreferenceSettings) -> None:
+    """Refuse a system or a file of control points that cannot be used."""
     if wanted.epsg is not None:
         ProjectedSystem.of_epsg(wanted.epsg)
     if wanted.control_points is not None:
         read_control_points(wanted.control_points)
 
 
-def _require_effect(recording: Recording, settings: RunSettings) -> None:
-    """Refuse a wish for coordinates where nothing says where on the Earth the recording is."""
-    wanted = settings.georeferencing
-    if recording.has_fixes or wanted.control_points is not None:
+def require_effect(wanted: GeoreferenceSettings, of: Path | str, *, is_placed: bool) -> None:
+    """Refuse a wish for coordinates where nothing says where on the Earth something is.
+
+    Parameters
+    ----------
+    of : what is to be placed
+    is_placed : whether GNSS fixes say where it is
+    """
+    if is_placed or wanted.control_points is not None:
         return
     if wanted.epsg is None and wanted.mode != "constraints":
         return
     what = f"--epsg {wanted.epsg}" if wanted.epsg is not None else "--georeference constraints"
     msg = (
-        f"{what} has no effect on {recording.paths[0]}: it has no GNSS fixes that the payload names, "
+        f"{what} has no effect on {of}: it has no GNSS fixes that the payload names, "
         "and there are no control points; name the topic under 'gnss' in payload.yaml, give "
         "--control-points, or leave the option out"
     )

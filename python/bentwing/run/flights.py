@@ -61,6 +61,7 @@ def map_flights(
         map_format=settings.map_format,
         map_spacing=settings.map_spacing,
         cleaning=settings.cleaning,
+        georeferencing=settings.georeferencing,
         threads=settings.threads,
         loop_closure=settings.closing,
         flights={n: [p.resolve() for p in f] for n, f in zip(names, flights, strict=True)},

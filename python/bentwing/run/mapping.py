@@ -80,7 +80,7 @@ def write_map(
     counts: dict[str, int] = {}
     record: dict[str, Any] = {}
     chunks = clean(
-        _one_after_the_other(sources, offsets, counts),
+        in_turn(sources, counts),
         path,
         duration=duration,
         settings=settings.cleaning,
@@ -130,9 +130,9 @@ def joined_trajectory(estimates: Sequence[Estimate]) -> Trajectory:
     )
 
 
-def _one_after_the_other(
-    sources: Sequence[MapSource], offsets: Sequence[float], counts: dict[str, int]
-) -> Iterator[MapChunk]:
+def in_turn(sources: Sequence[MapSource], counts: dict[str, int]) -> Iterator[MapChunk]:
+    """Yield the points of all runs, with times and numbers as if the runs had followed each other."""
+    offsets = follow_each_other([source.estimate for source in sources])
     total: Counter[str] = Counter()
     for number, (source, offset) in enumerate(zip(sources, offsets, strict=True)):
         own: dict[str, int] = {}

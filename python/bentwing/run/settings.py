@@ -43,6 +43,9 @@ class MapSettings(Settings):
         description="edge of the voxels that keep one point each; 0 keeps all points",
     )
     cleaning: CleanSettings = Field(default=CleanSettings(), description="what the map leaves out")
+    georeferencing: GeoreferenceSettings = Field(
+        default=GeoreferenceSettings(), description="how GNSS fixes and control points are used"
+    )
     threads: int | None = Field(
         default=None, ge=1, le=MOST_THREADS, description="number of threads; default: all cores"
     )
@@ -78,9 +81,6 @@ class RunSettings(MapSettings):
     """
 
     estimator: EstimatorName = Field(default="continuous", description="name of the estimator")
-    georeferencing: GeoreferenceSettings = Field(
-        default=GeoreferenceSettings(), description="how GNSS fixes and control points are used"
-    )
     loop_closure: GlobalSettings | Literal[False] = Field(
         default=GlobalSettings(),
         description="how loops are closed; false leaves the trajectory open-loop",

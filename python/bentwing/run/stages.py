@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from bentwing.base.errors import NotEnoughDataError
 from bentwing.base.progress import Progress
 from bentwing.closing.georeference.georeference import georeference
+from bentwing.closing.georeference.receivers import Receivers
 from bentwing.closing.global_registration import Budget, close_loops
 from bentwing.closing.joining.segments import close_segments
 from bentwing.closing.localize import Difference, NotInMapError, find_in_map
@@ -113,16 +114,14 @@ def place_on_earth(job: Job, found: Found) -> Found:
     estimate, part, settings = _known(found), job.part, job.settings.georeferencing
     if job.prior is not None:
         return replace(found, placed=job.prior.coordinates)
-    gnss = part.payload.gnss
-    if gnss is None and settings.control_points is None:
+    if part.payload.gnss is None and settings.control_points is None:
         return found
     with job.folder.stage("georeference"), Progress().stage("", part.length) as unseen:
         try:
             placed = georeference(
                 estimate.trajectory,
-                None if gnss is None else part.recording.fixes(part.start, part.duration),
+                receivers_of(part),
                 settings,
-                lever_arm=(0.0, 0.0, 0.0) if gnss is None else gnss.lever_arm,
                 segments=estimate.segments,
                 reach=part.payload.lidar.max_range,
                 chunks=lambda: _chunks(job, estimate, unseen, {}),
@@ -139,6 +138,13 @@ def place_on_earth(job: Job, found: Found) -> Found:
         )
     warnings = (*found.stage_warnings, *placed.warnings)
     return replace(found, estimate=estimate, placed=placed, stage_warnings=warnings)
+
+
+def receivers_of(part: RecordingPart, name: str = "") -> Receivers | None:
+    """Return the GNSS fixes of a part of a recording; None without any."""
+    gnss = part.payload.gnss
+    fixes = part.recording.fixes(part.start, part.duration)
+    return None if gnss is None or fixes is None else Receivers.one(fixes, gnss.lever_arm, name)
 
 
 def make_map(job: Job, found: Found) -> Found:

@@ -33,49 +33,25 @@ _WHITE = {"rtk": (0.008, 0.015), "single": (0.3, 0.6)}
 _WANDER = {"rtk": (0.008, 0.015), "single": (0.6, 1.2)}
 
 
-@dataclass(slots=True)
-class Receiver:
-    """A receiver; its errors wander with the stream.
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where on the Earth a world is; all flights in it are there.
 
     Attributes
     ----------
-    kind : `rtk` to a centimetre, `single` to a metre
-    rng : of errors and place
-    imu : motion of the IMU in the simulated world
-    noiseless : without any error
     frame : level frame at the world's origin
     heading : rad, by which the world's x axis lies north of east
     """
 
-    kind: ReceiverName
-    rng: np.random.Generator
-    imu: Callable[[Array], Motion]
-    noiseless: bool = False
-    frame: LevelFrame = field(init=False)
-    heading: float = field(init=False)
-    _wander: Array = field(init=False)
+    frame: LevelFrame
+    heading: float
 
-    def __post_init__(self) -> None:
-        # At the side of UTM zone 32, where grid north is one or two degrees off.
-        place = self.rng.uniform([10.5, 46.0, 200.0], [11.8, 49.0, 900.0])
-        self.frame = LevelFrame(*(float(value) for value in place))
-        self.heading = float(self.rng.uniform(-np.pi, np.pi))
-        self._wander = self.rng.normal(size=3)
-
-    def fixes(self, times: Array) -> list[FixRecord]:
-        """Measure at times (N,) s."""
-        motion = self.imu(times)
-        world = motion.p + motion.R @ np.array(LEVER_ARM)
-        points = self.to_level(world) + self._errors(len(times))
-        places = self.frame.to_geodetic(points)
-        white, wander = (np.array([t[self.kind][i] for i in (0, 0, 1)]) for t in (_WHITE, _WANDER))
-        covariance = np.diag(white**2 + wander**2).ravel()
-        return [
-            FixRecord(time, time + 0.08, longitude, latitude, height, covariance)
-            for time, (longitude, latitude, height) in zip(
-                times.tolist(), places.tolist(), strict=True
-            )
-        ]
+    @classmethod
+    def draw(cls, rng: np.random.Generator) -> Place:
+        """Choose a place at the side of UTM zone 32, where grid north is one or two degrees off."""
+        place = rng.uniform([10.5, 46.0, 200.0], [11.8, 49.0, 900.0])
+        frame = LevelFrame(*(float(value) for value in place))
+        return cls(frame, float(rng.uniform(-np.pi, np.pi)))
 
     def to_level(self, points: Array) -> Array:
         """Take points (N, 3) of the simulated world to east, north and up."""
@@ -91,6 +67,45 @@ class Receiver:
             "height": self.frame.height,
             "heading": self.heading,
         }
+
+
+@dataclass(slots=True)
+class Receiver:
+    """A receiver; its errors wander with the stream.
+
+    Attributes
+    ----------
+    kind : `rtk` to a centimetre, `single` to a metre
+    place : of the world
+    rng : of the errors
+    imu : motion of the IMU in the simulated world
+    noiseless : without any error
+    """
+
+    kind: ReceiverName
+    place: Place
+    rng: np.random.Generator
+    imu: Callable[[Array], Motion]
+    noiseless: bool = False
+    _wander: Array = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._wander = self.rng.normal(size=3)
+
+    def fixes(self, times: Array) -> list[FixRecord]:
+        """Measure at times (N,) s."""
+        motion = self.imu(times)
+        world = motion.p + motion.R @ np.array(LEVER_ARM)
+        points = self.place.to_level(world) + self._errors(len(times))
+        places = self.place.frame.to_geodetic(points)
+        white, wander = (np.array([t[self.kind][i] for i in (0, 0, 1)]) for t in (_WHITE, _WANDER))
+        covariance = np.diag(white**2 + wander**2).ravel()
+        return [
+            FixRecord(time, time + 0.08, longitude, latitude, height, covariance)
+            for time, (longitude, latitude, height) in zip(
+                times.tolist(), places.tolist(), strict=True
+            )
+        ]
 
     def _errors(self, n: int) -> Array:
         errors = np.zeros((n, 3))

@@ -146,7 +146,7 @@ class Scenario(Settings):
 
     def rng(self, purpose: str) -> np.random.Generator:
         """Random numbers that depend on the seed and on what they are for."""
-        of_world = purpose == "scene" or self.flight_seed is None
+        of_world = purpose in ("scene", "place") or self.flight_seed is None
         return np.random.default_rng(
             [self.seed if of_world else self.flight_seed, *purpose.encode()]
         )

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bentwing.simulate.events import GAP, LEAD, Losses, Person
-from bentwing.simulate.gnss import Receiver
+from bentwing.simulate.gnss import Place, Receiver
 from bentwing.simulate.heads.build import build_rig
 from bentwing.simulate.imu import Imu
 from bentwing.simulate.lidars.interface import LidarClock
@@ -55,7 +55,9 @@ def prepare(scenario: Scenario) -> Setup:
     ranger = Ranger(bodies, rig, errors, lidar.max_range, rng, beams, realism.ranges(beams))
     receiver = None
     if scenario.gnss is not None:
-        receiver = Receiver(scenario.gnss, scenario.rng("gnss"), rig.imu, scenario.noiseless)
+        place = Place.draw(scenario.rng("place"))
+        errors_of = scenario.rng("gnss")
+        receiver = Receiver(scenario.gnss, place, errors_of, rig.imu, scenario.noiseless)
     losses = _losses(scenario, first, last)
     host, samples = realism.host(), realism.samples(rig)
     sensors = Sensors(rig, ranger, imu, clock, losses, rng, receiver, host, samples)

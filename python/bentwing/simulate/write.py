@@ -82,7 +82,7 @@ def _write(
     write_yaml(files.payload, payload(setup, scenario))
     write_ply(files.scene, setup.world.site.mesh)
     if setup.sensors.receiver is not None:
-        write_yaml(out / "truth_georeference.yaml", setup.sensors.receiver.truth())
+        write_yaml(out / "truth_georeference.yaml", setup.sensors.receiver.place.truth())
     biases = [setup.sensors.imu.biases_at(setup.first)]
     with BagWriter(files.recording, scenario.format) as bag, files.trajectory.open("w") as truth:
         for start, end, records in setup.sensors.stream(setup.first, setup.last):

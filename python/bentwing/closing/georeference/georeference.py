@@ -16,6 +16,7 @@ from bentwing.closing.georeference.placement import (
     place,
 )
 from bentwing.closing.georeference.projection import MapProjection
+from bentwing.closing.georeference.shares import shares_of
 from bentwing.closing.georeference.site import Site
 
 if TYPE_CHECKING:
@@ -24,9 +25,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bentwing.base.trajectory import Trajectory
+    from bentwing.closing.georeference.receivers import Receivers
     from bentwing.closing.georeference.settings import GeoreferenceSettings
     from bentwing.map.chunk import MapChunk
-    from bentwing.recording.fixes import Fixes
 
     Array = NDArray[np.float64]
 
@@ -69,10 +70,9 @@ class Georeferenced:
 
 def georeference(
     trajectory: Trajectory,
-    fixes: Fixes | None,
+    receivers: Receivers | None,
     settings: GeoreferenceSettings,
     *,
-    lever_arm: Sequence[float] = (0.0, 0.0, 0.0),
     segments: Sequence[tuple[float, float]] = (),
     reach: float = 100.0,
     chunks: Callable[[], Iterable[MapChunk]] | None = None,
@@ -82,9 +82,8 @@ def georeference(
     Parameters
     ----------
     trajectory : `T_map_imu`
-    fixes : of the GNSS receiver
+    receivers : GNSS fixes and their antennas
     settings : how they are used
-    lever_arm : (3,) m, antenna in the IMU frame
     segments : first and last time of each stretch of the trajectory without a break, s
     reach : m, how far from the trajectory there are points
     chunks : gives the points of the map, needed with control points
@@ -97,10 +96,10 @@ def georeference(
         If the projected system or the file of the control points cannot be used.
     """
     listed = read_control_points(settings.control_points) if settings.control_points else []
-    if settings.mode == "off" or (fixes is None and not listed):
+    if settings.mode == "off" or (receivers is None and not listed):
         return None
     system = None if settings.epsg is None else ProjectedSystem.of_epsg(settings.epsg)
-    site = Site.of(trajectory, fixes, segments, lever_arm, system)
+    site = Site.of(trajectory, receivers, segments, system)
     placement, used = site.first_placement()
     marks: Marks | None = None
     before: list[float | None] = []
@@ -143,7 +142,8 @@ def _finished(
 ) -> Georeferenced:
     projection: MapProjection | None = None
     record: dict[str, Any] = {"mode": mode}
-    if site.frame is not None and site.system is not None:
+    warnings = []
+    if site.frame is not None and site.system is not None and site.receivers is not None:
         low = trajectory.positions.min(axis=0) - reach
         high = trajectory.positions.max(axis=0) + reach
         projection = MapProjection.over(low, high, site.frame, placement, site.system)
@@ -151,17 +151,20 @@ def _finished(
         gaps = placement.to_level(site.antenna(trajectory)[0]) - site.positions.targets
         kept = gaps[used]
         record["fixes"] = {
-            **site.counts,
+            **site.receivers.fixes.counts,
             "used": int(np.count_nonzero(used)),
             "rejected": int(np.count_nonzero(~used)),
             "rms_horizontal": float(np.sqrt(np.mean(np.sum(kept[:, :2] ** 2, axis=1)))),
             "rms_vertical": float(np.sqrt(np.mean(kept[:, 2] ** 2))),
         }
+        if len(site.receivers.names) > 1:
+            shares = shares_of(site.receivers, gaps, used)
+            record["fixes"]["runs"] = [share.to_json() for share in shares]
+            warnings += [share.sentence() for share in shares if share.disagrees]
     else:
         zero = np.zeros(3)
         linear = {"map": zero, "projected": placement.translation, "matrix": placement.rotation}
         record |= {"heading": placement.heading, "linear": linear}
-    warnings = []
     if placement.std[0] > DOUBTFUL_HEADING_STD:
         warnings.append(
             f"the heading of the map on the Earth is known to {np.degrees(placement.std[0]):.1f}° "

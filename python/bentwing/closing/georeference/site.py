@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from bentwing.base.trajectory import Trajectory
     from bentwing.closing.georeference.marks import Marks
-    from bentwing.recording.fixes import Fixes
+    from bentwing.closing.georeference.receivers import Receivers
 
     Array = NDArray[np.float64]
 
@@ -42,62 +42,62 @@ class Site:
     Attributes
     ----------
     original : the trajectory as it was estimated
-    times : (N,) s, of the fixes
+    receivers : the fixes during the trajectory; None without any
     levers : (N, 3) m, from the IMU to the antenna, in the axes of the map
     positions : of the antenna, in the map and on the Earth
     frame : level frame near the fixes; None without fixes
     system : of the map that is written; None without fixes
-    counts : of the fixes
     segments : first and last time of each stretch of the trajectory without a break, s
     """
 
     original: Trajectory
-    times: Array
+    receivers: Receivers | None
     levers: Array
     positions: Positions
     frame: LevelFrame | None
     system: ProjectedSystem | None
-    counts: dict[str, int]
     segments: Sequence[tuple[float, float]]
 
     @classmethod
     def of(
         cls,
         trajectory: Trajectory,
-        fixes: Fixes | None,
+        receivers: Receivers | None,
         segments: Sequence[tuple[float, float]],
-        lever_arm: Sequence[float],
         system: ProjectedSystem | None,
     ) -> Site:
         """Bring fixes and trajectory together."""
         empty = np.empty((0, 3))
-        if fixes is None:
+        if receivers is None:
             positions = Positions(empty, empty, np.empty((0, 3, 3)))
-            return cls(trajectory, np.empty(0), empty, positions, None, system, {}, segments)
-        covered = trajectory.covers(fixes.times)
+            return cls(trajectory, None, empty, positions, None, system, segments)
+        first, last = float(trajectory.times[0]), float(trajectory.times[-1])
+        seen = receivers.during([(first, last)])
         if segments:
-            covered &= np.any(
-                [(fixes.times >= a) & (fixes.times <= b) for a, b in segments], axis=0
-            )
-        times, places = fixes.times[covered], fixes.places[covered]
+            seen = seen.during(segments)
+        times, places = seen.fixes.times, seen.fixes.places
         if len(times) < 2:
             msg = (
-                f"{len(times)} of {fixes.counts['messages']} GNSS messages are fixes during the "
+                f"{len(times)} of {seen.fixes.counts['messages']} GNSS messages are fixes during the "
                 "trajectory; at least 2 are needed"
             )
             raise NotEnoughDataError(msg)
         frame = LevelFrame(*(float(value) for value in np.median(places, axis=0)))
         system = system or ProjectedSystem.utm(frame.longitude, frame.latitude)
         p, q = trajectory.interpolate(times)
-        levers = geometry.rotate(q, np.broadcast_to(np.asarray(lever_arm, float), p.shape))
+        levers = geometry.rotate(q, seen.lever_arms)
         positions = Positions(
             p + levers,
             frame.from_geodetic(places),
-            fixes.covariances[covered],
+            seen.fixes.covariances,
             independent_share(times),
         )
-        counts = dict(fixes.counts)
-        return cls(trajectory, times, levers, positions, frame, system, counts, segments)
+        return cls(trajectory, seen, levers, positions, frame, system, segments)
+
+    @property
+    def times(self) -> Array:
+        """(N,) s, of the fixes."""
+        return np.empty(0) if self.receivers is None else self.receivers.fixes.times
 
     def first_placement(self) -> tuple[Placement, NDArray[np.bool_]]:
         """Place the map by the fixes alone; without any, where it is."""

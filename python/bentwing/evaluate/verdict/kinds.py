@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from bentwing.evaluate.verdict.evidence import Evidence
 
 _NEVER = math.inf
+LAST_CAUSE = 3
+"""Up to this rank, evidence is about the samples themselves: no trajectory can be right with them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,7 +145,7 @@ KINDS: dict[str, Kind] = {
     "accelerometer": Kind(
         8, 0.8, 3.0,
         "the trajectory moves otherwise than the accelerometer says, by {force:.2f} m/s²{when}",
-        "check the accelerometer's axes and scale, and the unit of the ranges",
+        "check the accelerometer's axes and scale, T_imu_lidar, and the unit of the ranges",
     ),
     "gyro_noise": Kind(
         9, 3.0, _NEVER,

@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
-from bentwing.evaluate.verdict.kinds import KINDS
+from bentwing.evaluate.verdict.kinds import KINDS, LAST_CAUSE
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 State = Literal["good", "doubtful", "failed"]
 _RANK = {"good": 0, "doubtful": 1, "failed": 2}
+PLAIN = 2.0
+"""Times what is doubtful."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,7 +125,7 @@ def verdict_of(evidence: Iterable[Evidence], judged: Iterable[Reason] = ()) -> V
     """
     found = list(evidence)
     reasons = sorted([*judged, *filter(None, map(_reason, found))], key=_order)
-    state: State = reasons[0].state if reasons else "good"
+    state: State = max((r.state for r in reasons), key=_RANK.__getitem__, default="good")
     return Verdict(state, tuple(reasons), {one.kind: one.value for one in found})
 
 
@@ -143,5 +145,10 @@ def _reason(evidence: Evidence) -> Reason | None:
 
 
 def _order(reason: Reason) -> tuple[int, int]:
-    """Order reasons: the gravest first, a cause before its effects."""
-    return -_RANK[reason.state], KINDS[reason.kind].rank
+    """Order reasons: the gravest first, a cause before its effects.
+
+    What is plainly wrong with the samples is the cause of a failure even if it is none by itself.
+    """
+    rank = KINDS[reason.kind].rank
+    is_cause = rank <= LAST_CAUSE and not reason.value <= PLAIN * reason.bound
+    return -_RANK["failed" if is_cause else reason.state], rank

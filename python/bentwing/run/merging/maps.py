@@ -7,6 +7,7 @@ from collections import Counter
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+from bentwing.base.progress import as_progress
 from bentwing.base.run_record import RUN_FOLDER
 from bentwing.base.trajectory import DT
 from bentwing.closing.global_registration import Recorded, register_jointly
@@ -18,6 +19,7 @@ from bentwing.odometry.segments import joined
 from bentwing.run.folder import RunFolder
 from bentwing.run.found import Found
 from bentwing.run.mapping import MapSource, joined_trajectory, write_map
+from bentwing.run.merging.on_earth import place_on_earth
 from bentwing.run.merging.trajectories import write_trajectories
 from bentwing.run.report import report_run, say_warnings
 
@@ -172,19 +174,27 @@ def _one_map(
                 "the runs were put together by their places only, they were not registered with each "
                 f"other: {result.failure}"
             )
+    with folder.stage("georeference"):
+        seen = [_map_source(s, e, found, None) for s, e in zip(sources, estimates, strict=True)]
+        on_earth = place_on_earth(sources, seen, found.settings.georeferencing)
+    estimates = on_earth.estimates
+    notes += on_earth.warnings
     trajectory = joined_trajectory(estimates)
     sigma = max(source.payload.lidar.range_sigma for source in sources)
     with folder.stage("map"):
         runs = write_trajectories(folder, sources, placed, estimates)
+        shown = found.progress
         written = write_map(
             folder,
-            [_map_source(s, e, found) for s, e in zip(sources, estimates, strict=True)],
+            [_map_source(s, e, found, shown) for s, e in zip(sources, estimates, strict=True)],
             found.settings,
             duration=float(trajectory.times[-1]),
+            placed=on_earth.placed,
         )
     folder.record.found = Found(
         loop_closure=closing,
         merging={**found.record, "maps": [described]},
+        placed=on_earth.placed,
         map=written,
         runs=runs,
         stage_warnings=tuple(notes),
@@ -197,11 +207,15 @@ def _one_map(
     return MergedMap(folder.path, names, estimates, folder.record.found.verdict)
 
 
-def _map_source(source: Source, estimate: Estimate, found: Ingredients) -> MapSource:
+def _map_source(
+    source: Source, estimate: Estimate, found: Ingredients, progress: Progress | None
+) -> MapSource:
+    """Return a run whose points can be read, with or without a bar that shows how far that is."""
+
     def chunks(counts: dict[str, int]) -> Iterator[MapChunk]:
         with (
             source.part() as part,
-            found.progress.stage(f"map {source.name}", part.length) as shown,
+            as_progress(progress).stage(f"map {source.name}", part.length) as shown,
         ):
             yield from project(
                 part.batches(shown, Counter()),

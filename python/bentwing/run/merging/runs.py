@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from bentwing.base.errors import UsageError
 from bentwing.base.progress import Progress, as_progress
+from bentwing.closing.georeference.settings import GeoreferenceSettings
 from bentwing.closing.global_registration import Budget
 from bentwing.closing.global_registration.stretches import length_of
 from bentwing.closing.joining.describe import describe_matches, describe_parts_of
@@ -17,9 +18,11 @@ from bentwing.closing.joining.matches import Part, find_matches, parts_of
 from bentwing.closing.joining.placing import place_groups
 from bentwing.closing.joining.survey import Survey, survey
 from bentwing.map.clean import CleanSettings
+from bentwing.run.check import require_coordinates, require_effect
 from bentwing.run.folder import RunFolder
 from bentwing.run.found import Found
 from bentwing.run.merging.maps import Ingredients, MergedMap, make_maps
+from bentwing.run.merging.on_earth import settings_of_runs
 from bentwing.run.merging.source import Source, open_sources
 from bentwing.run.settings import merge_settings
 
@@ -52,6 +55,7 @@ def merge(
     map_format: str = "laz",
     map_spacing: float = 0.0,
     cleaning: CleanSettings | None = None,
+    georeferencing: GeoreferenceSettings | None = None,
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> Merged:
@@ -70,6 +74,8 @@ def merge(
     map_spacing : m, edge of the voxels that keep one point each; 0 keeps all points
     cleaning : what is left out of the map; default: mixed pixels and what moved, while a run was
         flown or between the runs
+    georeferencing : how the GNSS fixes of all runs and control points are used; what is not given is
+        as in the runs, where they agree
     threads : default: all cores
     progress : what to tell the user meanwhile; default: nothing
 
@@ -81,10 +87,16 @@ def merge(
         map_format=map_format,
         map_spacing=map_spacing,
         cleaning=cleaning or CleanSettings(),
+        georeferencing=georeferencing or GeoreferenceSettings(),
         threads=threads,
         runs=[Path(run).resolve() for run in runs],
     )
+    require_coordinates(settings.georeferencing)
     sources = open_sources([Path(run) for run in runs])
+    wanted = settings_of_runs(settings.georeferencing, sources)
+    settings = settings.model_copy(update={"georeferencing": wanted})
+    is_placed = any(source.payload.gnss is not None for source in sources)
+    require_effect(wanted, "these runs", is_placed=is_placed)
     if any(Path(out).resolve() == source.folder.resolve() for source in sources):
         msg = (
             f"{out}: is one of the runs that are to be merged; choose another folder for the result"

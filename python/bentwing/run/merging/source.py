@@ -13,6 +13,7 @@ from pydantic import ValidationError
 from bentwing.base.errors import InputError, UsageError
 from bentwing.base.provenance import describe_input, files_of
 from bentwing.base.run_record import finished_record, understood
+from bentwing.closing.georeference.settings import GeoreferenceSettings
 from bentwing.recording import Payload, Recording
 from bentwing.recording.preprocess import RecordingPart
 from bentwing.run.run import estimate_of, require_single, verdict_in
@@ -35,6 +36,7 @@ class Source:
     recordings : files that are one recording
     start, duration : s, the part of the recording that was used; None for all of it
     force : whether the run mapped the recording although it is unfit
+    georeferencing : how the run used GNSS fixes and control points
     start_ns : time zero of the recording, ns UTC
     inputs : what run.json says about the files
     warnings, verdict : of the run
@@ -48,6 +50,7 @@ class Source:
     start_ns: int
     payload: Payload
     force: bool
+    georeferencing: GeoreferenceSettings
     estimate: Estimate
     inputs: list[dict[str, Any]]
     warnings: list[str]
@@ -135,6 +138,7 @@ def _source(folder: Path, name: str, record: dict[str, Any]) -> Source:
         int(record["start_ns"]),
         _payload(folder, settings),
         bool(settings.get("force")),
+        GeoreferenceSettings.model_validate(settings.get("georeferencing") or {}),
         estimate_of(folder, record),
         record["inputs"],
         list(record.get("warnings") or []),

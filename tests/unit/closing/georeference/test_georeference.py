@@ -10,6 +10,7 @@ from bentwing.base.geodesy import LevelFrame, ProjectedSystem
 from bentwing.base.trajectory import Trajectory
 from bentwing.closing.georeference.georeference import georeference
 from bentwing.closing.georeference.placement import Placement
+from bentwing.closing.georeference.receivers import Receivers
 from bentwing.closing.georeference.settings import GeoreferenceSettings
 from bentwing.map.chunk import MapChunk
 from bentwing.recording.fixes import Fixes
@@ -89,9 +90,8 @@ def marks(tmp_path):
 def placed(measured, **settings):
     return georeference(
         trajectory(),
-        measured,
+        None if measured is None else Receivers.one(measured, LEVER),
         GeoreferenceSettings(**settings),
-        lever_arm=LEVER,
         chunks=chunks,
     )
 

@@ -336,6 +336,14 @@ def test_the_gravest_reason_decides_and_a_cause_comes_before_its_effects():
     assert "report.html has 3 more" in found.sentence()
 
 
+def test_samples_that_are_plainly_wrong_are_named_before_what_follows_from_them():
+    loose = Evidence("loop", 0.5)
+    for period, kinds in ((0.1, ["imu_period", "loop"]), (0.04, ["loop", "imu_period"])):
+        found = verdict_of([loose, Evidence("imu_period", period, (), {"rate": 1.0 / period})])
+        assert found.state == "failed"
+        assert [r.kind for r in found.reasons] == kinds
+
+
 def test_a_verdict_comes_back_from_json():
     found = verdict_of(judge_estimate(estimate(), PAYLOAD, watched(lambda _, g, a: (-g, a))))
     assert found.reasons

@@ -4,10 +4,12 @@
 from __future__ import annotations
 
 from html import escape
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bentwing.base.trajectory import Trajectory
 from bentwing.report.picture import thinned
 
 if TYPE_CHECKING:
@@ -15,9 +17,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from bentwing.base.trajectory import Trajectory
-
 Row = tuple[str, ...]
+_PAUSE = 1.0  # s without a pose: there one run ends and the next begins
 
 DASH, TIMES = "\N{EN DASH}", "\N{MULTIPLICATION SIGN}"
 
@@ -81,9 +82,10 @@ def tiles(record: Mapping[str, Any], trajectory: Trajectory, points: NDArray[np.
     counts, timings = record.get("counts") or {}, record.get("timings") or {}
     facts: list[tuple[str, str]] = []
     if len(trajectory.times) > 1:
-        duration = float(trajectory.times[-1] - trajectory.times[0])
+        parts = _parts(trajectory)
+        duration = sum(float(part.times[-1] - part.times[0]) for part in parts)
         facts.append((_clock(duration), "recording"))
-        facts.append((f"{path_length(trajectory):,.0f} m", "path flown or walked"))
+        facts.append((f"{sum(map(path_length, parts)):,.0f} m", "path flown or walked"))
         if timings.get("total"):
             facts.append((f"{duration / timings['total']:.1f} {TIMES}", "real time"))
     if "map.points" in counts:
@@ -98,6 +100,16 @@ def tiles(record: Mapping[str, Any], trajectory: Trajectory, points: NDArray[np.
         f'<div class="tile"><b>{escape(b)}</b><span>{escape(s)}</span></div>' for b, s in facts
     ]
     return f'<div class="tiles">{"".join(cells)}</div>'
+
+
+def _parts(trajectory: Trajectory) -> list[Trajectory]:
+    """Return the trajectories of runs that were joined one after the other, with a pause between."""
+    cuts = [0, *(np.flatnonzero(np.diff(trajectory.times) > _PAUSE) + 1), len(trajectory.times)]
+    slices = [slice(a, b) for a, b in pairwise(cuts) if b - a > 1]
+    return [
+        Trajectory(trajectory.times[s], trajectory.positions[s], trajectory.quats_xyzw[s])
+        for s in slices
+    ]
 
 
 def path_length(trajectory: Trajectory) -> float:

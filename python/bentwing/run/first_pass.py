@@ -46,13 +46,16 @@ _OF_SAMPLES = frozenset(
         "point_order",
     )
 )
+# Plain where it comes first; no set-up makes up for samples that are not there.
+_SPARSE = "imu_period"
 
 
 def blames_head(verdict: Verdict) -> bool:
     """Whether another set-up of the head may explain why an estimate is not good."""
     kinds = {reason.kind for reason in verdict.reasons}
     failed = {reason.kind for reason in verdict.reasons if reason.state == "failed"}
-    return bool(kinds & _OF_HEAD) and not failed & _OF_SAMPLES
+    is_sparse = bool(verdict.reasons) and verdict.reasons[0].kind == _SPARSE
+    return bool(kinds & _OF_HEAD) and not failed & _OF_SAMPLES and not is_sparse
 
 
 class FirstPass:

@@ -163,7 +163,11 @@ Epsg = Annotated[
 ]
 ControlPoints = Annotated[
     Path | None,
-    option(EARTH, metavar="FILE", help="CSV of surveyed points: id,x,y,z,radius[,use]."),
+    option(
+        EARTH,
+        metavar="FILE",
+        help="CSV of surveyed points: id, x, y, z, and radius, use, map_x, map_y, map_z where known.",
+    ),
 ]
 
 WritePayload = Annotated[

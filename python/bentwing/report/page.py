@@ -207,6 +207,16 @@ def _calibrations(record: Mapping[str, Any]) -> str:
     return "".join(tables)
 
 
+_OF_FIXES = {
+    "messages": "GNSS messages",
+    "fixes": "GNSS fixes",
+    "used": "GNSS fixes used",
+    "rejected": "GNSS fixes left out",
+    "rms_horizontal": "map from fixes, horizontal rms, m",
+    "rms_vertical": "map from fixes, vertical rms, m",
+}
+
+
 def _georeference(found: Mapping[str, Any] | None) -> str:
     if not found:
         return ""
@@ -219,7 +229,12 @@ def _georeference(found: Mapping[str, Any] | None) -> str:
         facts["standard deviation of the place, m"] = list(found["std"]["translation"])
         facts["meridian convergence, °"] = found["convergence_deg"]
         facts["point scale"] = found["point_scale"]
-    facts |= {f"fixes {name.replace('_', ' ')}": n for name, n in found.get("fixes", {}).items()}
+    fixes = found.get("fixes") or {}
+    facts |= {
+        _OF_FIXES.get(name, f"GNSS messages, {name.replace('_', ' ')}"): value
+        for name, value in fixes.items()
+        if name != "runs"
+    }
     if "bent_by" in found:
         facts["trajectory bent by at most, m"] = found["bent_by"]
     cells = f"<div>{sections.mapping_table(('what', 'value'), facts)}</div>"
@@ -227,6 +242,8 @@ def _georeference(found: Mapping[str, Any] | None) -> str:
         rows = sections.residuals_table(found["control_points"])
         left = sections.mapping_table(("control points", "m"), found.get("residuals") or {})
         cells += f"<div><h3>Control points</h3>{rows}{left}</div>"
+    if fixes.get("runs"):
+        cells += f"<div><h3>GNSS fixes of the runs</h3>{sections.shares_table(fixes['runs'])}</div>"
     return f'<h2>Place on the Earth</h2><div class="grid">{cells}</div>'
 
 

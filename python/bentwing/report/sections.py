@@ -163,6 +163,7 @@ def residuals_table(rows: Sequence[Mapping[str, Any]]) -> str:
             DASH if row["normal"] is None else ", ".join(f"{n:+.2f}" for n in row["normal"]),
             millimetres(row["before"]),
             millimetres(row["residual"]),
+            millimetres(row.get("picked_off")),
         )
         for row in rows
     ]
@@ -171,10 +172,24 @@ def residuals_table(rows: Sequence[Mapping[str, Any]]) -> str:
         "use",
         "points",
         "normal (east, north, up)",
-        "by GNSS alone, mm",
+        "before, mm",
         "residual, mm",
+        "seen in the map, off by, mm",
     )
-    return table(head, cells, numbers=frozenset({2, 4, 5}))
+    return table(head, cells, numbers=frozenset({2, 4, 5, 6}))
+
+
+def shares_table(shares: Sequence[Mapping[str, Any]]) -> str:
+    """Make the table of runs whose GNSS fixes place a merged map."""
+
+    def metres(offset: Sequence[float] | None) -> str:
+        return DASH if offset is None else ", ".join(f"{value:+.3f}" for value in offset)
+
+    cells = [
+        (s["name"], f"{s['used']:,}", f"{s['rejected']:,}", metres(s["offset"])) for s in shares
+    ]
+    head = ("run", "used", "left out", "map from fixes (east, north, up), m")
+    return table(head, cells, numbers=frozenset({1, 2}))
 
 
 def inputs_table(inputs: Sequence[Mapping[str, Any]]) -> str:

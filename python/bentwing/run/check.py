@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from bentwing.base.errors import UsageError
 from bentwing.base.geodesy import ProjectedSystem
-from bentwing.closing.georeference.control_points import read_control_points
+from bentwing.closing.georeference.control_point_file import read_control_points
 from bentwing.run.head import Head
 
 if TYPE_CHECKING:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""Surveyed points, from a CSV file, and the surfaces of the map around them.
+"""Surveyed points, and the surfaces of the map around them.
 
 A mark on the ground has no shape a lidar could see. What is measured is the surface around it: the
 plane through the points of the map within `radius` of the mark, and the mark's distance from it
@@ -8,17 +8,12 @@ along the normal. A mark on a floor so tells the height, one on a wall the way a
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from bentwing.base.errors import InputError
-
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from numpy.typing import NDArray
 
     from bentwing.map.chunk import MapChunk
@@ -30,8 +25,6 @@ MAX_POINTS = 40_000  # of one mark in memory
 MIN_SPREAD = 0.1  # of the radius, across: points of one scan line have no normal
 MIN_SIGMA = 0.003  # m; marks are not surveyed better
 _TRIMMED = 3.0
-_COLUMNS = ("id", "x", "y", "z", "radius")
-_USES = ("control", "check")
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,15 +34,18 @@ class ControlPoint:
     Attributes
     ----------
     name : of the mark
-    position : (3,) m, easting, northing, height in the map's system
+    position : (3,) m, easting, northing, height in the map's system; of a file in degrees longitude,
+        latitude, height
     radius : m, of the surface around it that is flat
     use : `control` points constrain the map, `check` points only tell how good it is
+    picked : (3,) m, where the mark was seen in the map; None where nobody has said
     """
 
     name: str
     position: Array
     radius: float
     use: Literal["control", "check"]
+    picked: Array | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,54 +62,6 @@ class Plane:
     def sigma(self) -> float:
         """Standard deviation of the surface's place across, m."""
         return float(np.hypot(self.thickness / np.sqrt(self.n_points), MIN_SIGMA))
-
-
-def read_control_points(path: Path) -> list[ControlPoint]:
-    """Read `id,x,y,z,radius` and, where the heading names it, `use` (control, the default, or check).
-
-    Raises
-    ------
-    InputError
-        If a column is missing, a value is no number, a radius is not positive, or a name is twice.
-    """
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            lines = [line for line in file if line.strip() and not line.startswith("#")]
-    except OSError as error:
-        msg = f"{path}: cannot be read ({error.strerror})"
-        raise InputError(msg) from None
-    except UnicodeDecodeError as error:
-        msg = f"{path}: not readable as control points ({error})"
-        raise InputError(msg) from error
-    reader = csv.DictReader(lines, skipinitialspace=True)
-    missing = [name for name in _COLUMNS if name not in (reader.fieldnames or [])]
-    if missing:
-        msg = f"{path}: has no column {', '.join(missing)}; its first line must be id,x,y,z,radius"
-        raise InputError(msg)
-    points = [_control_point(path, row) for row in reader]
-    names = [point.name for point in points]
-    twice = sorted({name for name in names if names.count(name) > 1})
-    if twice or not points:
-        what = f"names {', '.join(twice)} twice" if twice else "holds no point"
-        msg = f"{path}: {what}; give every mark one line"
-        raise InputError(msg)
-    return points
-
-
-def _control_point(path: Path, row: dict[str, str]) -> ControlPoint:
-    name, use = str(row["id"]).strip(), (row.get("use") or "control").strip().lower()
-    try:
-        x, y, z, radius = (float(row[key]) for key in _COLUMNS[1:])
-    except (TypeError, ValueError):
-        x = y = z = radius = np.nan
-    position = np.array([x, y, z])
-    if not (np.isfinite(position).all() and 0 < radius < 100) or use not in _USES:
-        msg = (
-            f"{path}: point {name!r} is {dict(row)}; expected x, y, z and a radius in metres, and as "
-            "use control or check"
-        )
-        raise InputError(msg)
-    return ControlPoint(name, position, radius, "control" if use == "control" else "check")
 
 
 @dataclass(slots=True)

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bentwing.base.errors import NotEnoughDataError
 from bentwing.base.geodesy import ProjectedSystem
-from bentwing.closing.georeference.control_points import read_control_points
+from bentwing.closing.georeference.control_point_file import read_control_points
 from bentwing.closing.georeference.marks import Marks, summary
 from bentwing.closing.georeference.placement import (
     Placement,
@@ -95,19 +96,26 @@ def georeference(
     UsageError, InputError
         If the projected system or the file of the control points cannot be used.
     """
-    listed = read_control_points(settings.control_points) if settings.control_points else []
-    if settings.mode == "off" or (receivers is None and not listed):
+    listed = read_control_points(settings.control_points) if settings.control_points else None
+    if settings.mode == "off" or (receivers is None and listed is None):
         return None
     system = None if settings.epsg is None else ProjectedSystem.of_epsg(settings.epsg)
-    site = Site.of(trajectory, receivers, segments, system)
+    site = Site.of(trajectory, receivers, segments, system, listed)
     placement, used = site.first_placement()
     marks: Marks | None = None
     before: list[float | None] = []
     slack = site.slack()
-    if listed and chunks is not None:
-        targets = site.targets_of(np.array([point.position for point in listed]))
-        marks = Marks.collect(listed, targets, placement, slack, chunks())
+    if listed is not None and chunks is not None:
+        targets = site.targets_of(listed)
+        marks = Marks.collect(listed.points, targets, placement, slack, chunks())
         marks.measure(placement, slack)
+        if not len(site.positions.points) and not any(marks.planes):
+            msg = (
+                f"the map has no flat surface within {slack:.1f} m of any control point: without GNSS it is "
+                "in a frame of its own, and two or more marks whose places in the map the file gives "
+                "as map_x, map_y, map_z say where that is"
+            )
+            raise NotEnoughDataError(msg)
         before = marks.residuals(placement)
         for i in range(_MEASURED):
             surfaces, _ = marks.surfaces()
@@ -140,31 +148,13 @@ def _finished(
     before: Sequence[float | None],
     mode: str,
 ) -> Georeferenced:
-    projection: MapProjection | None = None
-    record: dict[str, Any] = {"mode": mode}
-    warnings = []
-    if site.frame is not None and site.system is not None and site.receivers is not None:
-        low = trajectory.positions.min(axis=0) - reach
-        high = trajectory.positions.max(axis=0) + reach
-        projection = MapProjection.over(low, high, site.frame, placement, site.system)
-        record |= projection.record()
+    projection, record = _projected(site, trajectory, placement, reach)
+    record["mode"] = mode
+    warnings: list[str] = []
+    if site.receivers is not None:
         gaps = placement.to_level(site.antenna(trajectory)[0]) - site.positions.targets
-        kept = gaps[used]
-        record["fixes"] = {
-            **site.receivers.fixes.counts,
-            "used": int(np.count_nonzero(used)),
-            "rejected": int(np.count_nonzero(~used)),
-            "rms_horizontal": float(np.sqrt(np.mean(np.sum(kept[:, :2] ** 2, axis=1)))),
-            "rms_vertical": float(np.sqrt(np.mean(kept[:, 2] ** 2))),
-        }
-        if len(site.receivers.names) > 1:
-            shares = shares_of(site.receivers, gaps, used)
-            record["fixes"]["runs"] = [share.to_json() for share in shares]
-            warnings += [share.sentence() for share in shares if share.disagrees]
-    else:
-        zero = np.zeros(3)
-        linear = {"map": zero, "projected": placement.translation, "matrix": placement.rotation}
-        record |= {"heading": placement.heading, "linear": linear}
+        record["fixes"], said = _of_fixes(site.receivers, gaps, used)
+        warnings += said
     if placement.std[0] > DOUBTFUL_HEADING_STD:
         warnings.append(
             f"the heading of the map on the Earth is known to {np.degrees(placement.std[0]):.1f}° "
@@ -173,13 +163,41 @@ def _finished(
     if marks is not None:
         rows = marks.table(placement, before)
         record["control_points"], record["residuals"] = rows, summary(rows)
-        missing = [row["id"] for row in rows if row["residual"] is None]
-        if missing:
-            warnings.append(
-                f"no flat surface was found within the radius of {', '.join(missing)}: these "
-                "control points are not used"
-            )
+        warnings += marks.warnings(placement)
     if trajectory is not site.original:
         moved = np.linalg.norm(trajectory.positions - site.original.positions, axis=1)
         record["bent_by"] = float(moved.max())
     return Georeferenced(trajectory, projection, placement, record, warnings)
+
+
+def _projected(
+    site: Site, trajectory: Trajectory, placement: Placement, reach: float
+) -> tuple[MapProjection | None, dict[str, Any]]:
+    """Return the projection, None into a frame that the marks have of their own, and its record."""
+    if site.frame is None or site.system is None:
+        zero = np.zeros(3)
+        linear = {"map": zero, "projected": placement.translation, "matrix": placement.rotation}
+        return None, {"heading": placement.heading, "linear": linear}
+    low = trajectory.positions.min(axis=0) - reach
+    high = trajectory.positions.max(axis=0) + reach
+    projection = MapProjection.over(low, high, site.frame, placement, site.system)
+    return projection, projection.record()
+
+
+def _of_fixes(
+    receivers: Receivers, gaps: Array, used: NDArray[np.bool_]
+) -> tuple[dict[str, Any], list[str]]:
+    """Return what is recorded of the fixes, and what is said of runs that contradict them."""
+    kept = gaps[used]
+    record: dict[str, Any] = {
+        **receivers.fixes.counts,
+        "used": int(np.count_nonzero(used)),
+        "rejected": int(np.count_nonzero(~used)),
+        "rms_horizontal": float(np.sqrt(np.mean(np.sum(kept[:, :2] ** 2, axis=1)))),
+        "rms_vertical": float(np.sqrt(np.mean(kept[:, 2] ** 2))),
+    }
+    if len(receivers.names) == 1:
+        return record, []
+    shares = shares_of(receivers, gaps, used)
+    record["runs"] = [share.to_json() for share in shares]
+    return record, [share.sentence() for share in shares if share.disagrees]

@@ -24,6 +24,9 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
+FAR = 0.1
+"""m; nobody sees a mark farther off in a cloud."""
+
 
 @dataclass(slots=True)
 class Marks:
@@ -124,9 +127,35 @@ class Marks:
                     "thickness": None if plane is None else plane.thickness,
                     "before": first,
                     "residual": last,
+                    "picked_off": None if mark.picked is None else self._off(mark, placement),
                 }
             )
         return rows
+
+    def warnings(self, placement: Placement) -> list[str]:
+        """Name marks that have no surface, or lie elsewhere than the others say."""
+        said = []
+        pairs = zip(self.listed, self.planes, strict=True)
+        missing = [mark.name for mark, plane in pairs if plane is None and mark.picked is None]
+        if missing:
+            said.append(
+                f"no flat surface was found within the radius of {', '.join(missing)}: these "
+                "control points are not used"
+            )
+        for mark in self.listed:
+            off = None if mark.picked is None else self._off(mark, placement)
+            if off is not None and off > FAR:
+                said.append(
+                    f"{mark.name} was seen {off:.2f} m from where the other marks put it: check its "
+                    "coordinates and map_x, map_y, map_z, or give it the use check"
+                )
+        return said
+
+    def _off(self, mark: ControlPoint, placement: Placement) -> float:
+        """Return how far from its place a mark was seen, m."""
+        assert mark.picked is not None
+        target = self.targets[[one.name for one in self.listed].index(mark.name)]
+        return float(np.linalg.norm(placement.to_level(mark.picked[None])[0] - target))
 
 
 def summary(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:

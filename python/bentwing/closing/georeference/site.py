@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -26,12 +26,15 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bentwing.base.trajectory import Trajectory
+    from bentwing.closing.georeference.control_point_file import ControlPoints
     from bentwing.closing.georeference.marks import Marks
     from bentwing.closing.georeference.receivers import Receivers
 
     Array = NDArray[np.float64]
 
 MAX_HEADING_STD = np.radians(15.0)  # worse than a compass: the map would point anywhere
+FEWEST_PICKED = 2
+PICKED = 0.02  # m, to which a mark is found in a cloud
 _SLACK = (0.3, 3.0)  # m, least and most by which a mark is looked for beside its place
 
 
@@ -44,9 +47,9 @@ class Site:
     original : the trajectory as it was estimated
     receivers : the fixes during the trajectory; None without any
     levers : (N, 3) m, from the IMU to the antenna, in the axes of the map
-    positions : of the antenna, in the map and on the Earth
-    frame : level frame near the fixes; None without fixes
-    system : of the map that is written; None without fixes
+    positions : of the antenna, or without fixes of marks that were seen, in the map and on the Earth
+    frame : level frame near the fixes or marks; None where these are in a system of their own
+    system : of the map that is written; None there, too
     segments : first and last time of each stretch of the trajectory without a break, s
     """
 
@@ -65,12 +68,11 @@ class Site:
         receivers: Receivers | None,
         segments: Sequence[tuple[float, float]],
         system: ProjectedSystem | None,
+        listed: ControlPoints | None = None,
     ) -> Site:
-        """Bring fixes and trajectory together."""
-        empty = np.empty((0, 3))
+        """Bring fixes and trajectory together; without fixes, control points and the map."""
         if receivers is None:
-            positions = Positions(empty, empty, np.empty((0, 3, 3)))
-            return cls(trajectory, None, empty, positions, None, system, segments)
+            return cls._of_marks(trajectory, segments, system, listed)
         first, last = float(trajectory.times[0]), float(trajectory.times[-1])
         seen = receivers.during([(first, last)])
         if segments:
@@ -94,17 +96,60 @@ class Site:
         )
         return cls(trajectory, seen, levers, positions, frame, system, segments)
 
+    @classmethod
+    def _of_marks(
+        cls,
+        trajectory: Trajectory,
+        segments: Sequence[tuple[float, float]],
+        system: ProjectedSystem | None,
+        listed: ControlPoints | None,
+    ) -> Site:
+        """Return a map that only marks place: in a projected system if one is known, else in their own."""
+        empty = np.empty((0, 3))
+        nowhere = Positions(empty, empty, np.empty((0, 3, 3)))
+        bare = cls(trajectory, None, empty, nowhere, None, system, segments)
+        if listed is None:
+            return bare
+        picked = [
+            number
+            for number, point in enumerate(listed.points)
+            if point.picked is not None and point.use == "control"
+        ]
+        if len(picked) < FEWEST_PICKED and (picked or listed.in_degrees):
+            msg = (
+                f"{len(picked)} of {len(listed.points)} control points were seen in the map; without GNSS "
+                f"at least {FEWEST_PICKED} must have map_x, map_y, map_z"
+            )
+            raise NotEnoughDataError(msg)
+        if not picked:
+            return bare
+        if listed.in_degrees or system is not None:
+            bare = bare._around(listed)
+        seen = np.array([listed.points[number].picked for number in picked])
+        covariances = np.tile(PICKED**2 * np.eye(3), (len(picked), 1, 1))
+        targets = bare.targets_of(listed)[picked]
+        return replace(bare, positions=Positions(seen, targets, covariances))
+
+    def _around(self, listed: ControlPoints) -> Site:
+        """Return the site with a level frame in the middle of marks."""
+        places = np.array([point.position for point in listed.points])
+        if not listed.in_degrees and self.system is not None:
+            places = self.system.to_geodetic(places)
+        frame = LevelFrame(*(float(value) for value in np.median(places, axis=0)))
+        system = self.system or ProjectedSystem.utm(frame.longitude, frame.latitude)
+        return replace(self, frame=frame, system=system)
+
     @property
     def times(self) -> Array:
         """(N,) s, of the fixes."""
         return np.empty(0) if self.receivers is None else self.receivers.fixes.times
 
     def first_placement(self) -> tuple[Placement, NDArray[np.bool_]]:
-        """Place the map by the fixes alone; without any, where it is."""
-        if self.frame is None:
+        """Place the map by the fixes, or by the marks that were seen in it; without any, where it is."""
+        if not len(self.positions.points):
             return Placement(0.0, np.zeros(3), np.zeros(4)), np.empty(0, np.bool_)
         placement, used = place(self.positions, Surfaces.none())
-        if placement.std[0] > MAX_HEADING_STD:
+        if self.receivers is not None and placement.std[0] > MAX_HEADING_STD:
             msg = (
                 f"the GNSS fixes give the heading of the map to {np.degrees(placement.std[0]):.1f}° "
                 "only: the path is too short for their noise"
@@ -119,17 +164,19 @@ class Site:
         variances = np.diagonal(self.positions.covariances, axis1=1, axis2=2)
         return float(np.clip(3 * np.sqrt(np.median(variances.max(axis=1))), *_SLACK))
 
-    def targets_of(self, coordinates: Array) -> Array:
-        """East, north, up (K, 3) of coordinates in the projected system."""
+    def targets_of(self, listed: ControlPoints) -> Array:
+        """East, north, up (K, 3) of marks."""
+        coordinates = np.array([point.position for point in listed.points])
         if self.frame is None or self.system is None:
             return coordinates
-        targets = self.frame.from_geodetic(self.system.to_geodetic(coordinates))
+        places = coordinates if listed.in_degrees else self.system.to_geodetic(coordinates)
+        targets = self.frame.from_geodetic(places)
         far = float(np.linalg.norm(targets, axis=1).max())
         if not far < 1e5:
             msg = (
-                f"a control point is {far / 1000:.0f} km from the GNSS fixes; its coordinates are "
-                f"taken as easting, northing and height in EPSG:{self.system.epsg}; give the "
-                "system they are in with --epsg"
+                f"a control point is {far / 1000:.0f} km from the others and from any GNSS fix; "
+                f"coordinates in metres are taken as easting, northing and height in "
+                f"EPSG:{self.system.epsg}; give the system they are in with --epsg"
             )
             raise UsageError(msg)
         return targets
@@ -143,7 +190,7 @@ class Site:
     ) -> Trajectory:
         """Let a trajectory give way to the fixes and the control points."""
         observations = []
-        if used.any():
+        if self.receivers is not None and used.any():
             antenna, levers = self.antenna(trajectory)
             positions = Positions(
                 antenna[used],

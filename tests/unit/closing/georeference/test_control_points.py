@@ -3,7 +3,8 @@ import numpy as np
 import pytest
 
 from bentwing.base.errors import InputError
-from bentwing.closing.georeference.control_points import plane_around, read_control_points
+from bentwing.closing.georeference.control_point_file import RADIUS, read_control_points
+from bentwing.closing.georeference.control_points import plane_around
 
 
 def read(tmp_path, text):
@@ -14,16 +15,46 @@ def read(tmp_path, text):
 
 def test_points_are_read_with_their_use(tmp_path):
     text = "# surveyed\nid, x, y, z, radius, use\nA,1,2,3,0.5,check\n\nB,4,5,6,0.25,\n"
-    first, second = read(tmp_path, text)
+    listed = read(tmp_path, text)
+    first, second = listed.points
+    assert not listed.in_degrees
     assert (first.name, first.use, second.use) == ("A", "check", "control")
     assert second.position.tolist() == [4, 5, 6]
     assert second.radius == 0.25
 
 
 @pytest.mark.parametrize(
+    "text",
+    [
+        "Punkt;Rechtswert;Hochwert;Höhe\nA;694750,708;5177601,273;427,364\n",
+        "Name\tEasting [m]\tNorthing [m]\tElevation (m)\nA\t694750.708\t5177601.273\t427.364\n",
+        "point,N,E,H\nA,5177601.273,694750.708,427.364\n",
+    ],
+)
+def test_files_of_surveying_programs_are_read_as_they_are(tmp_path, text):
+    (point,) = read(tmp_path, text).points
+    assert point.position.tolist() == [694750.708, 5177601.273, 427.364]
+    assert (point.name, point.radius, point.use, point.picked) == ("A", RADIUS, "control", None)
+
+
+def test_degrees_and_places_in_the_map_are_recognized(tmp_path):
+    listed = read(
+        tmp_path, "id,lat,lon,h,map_x,map_y,map_z\nA,47.5,11.3,700,1,2,3\nB,47.6,11.2,701,,,\n"
+    )
+    first, second = listed.points
+    assert listed.in_degrees
+    assert first.position.tolist() == [11.3, 47.5, 700.0]
+    assert first.picked.tolist() == [1, 2, 3]
+    assert second.picked is None
+    assert listed.columns["latitude"] == "lat"
+
+
+@pytest.mark.parametrize(
     ("text", "what"),
     [
-        ("id,x,y,z\nA,1,2,3\n", "no column radius"),
+        ("id,x,y\nA,1,2\n", "no column z"),
+        ("A,1,2,3\n", "must name id, x, y, z"),
+        ("id,x,y,z,map_x,map_y,map_z\nA,1,2,3,1,2,b\n", "point 'A'"),
         ("id,x,y,z,radius\nA,1,2,b,1\n", "point 'A'"),
         ("id,x,y,z,radius\nA,1,2,3,-1\n", "point 'A'"),
         ("id,x,y,z,radius\nA,1,2\n", "point 'A'"),

@@ -183,3 +183,70 @@ def test_without_fixes_control_points_speak_the_language_of_the_map(tmp_path):
     found = placed(None, control_points=path)
     assert found.crs_wkt is None
     assert np.allclose(found.to_projected(np.zeros((1, 3))), off, atol=0.005)
+
+
+def site_grid(tmp_path, *, wrong=None, picked=5, head="id,x,y,z,map_x,map_y,map_z,use"):
+    """Marks on a grid that is turned by 30° and far away; a mark is seen to 2 cm in the map."""
+    rng, grid = (
+        np.random.default_rng(4),
+        Placement(np.radians(30), np.array([5e3, 1e4, 100.0]), np.zeros(4)),
+    )
+    lines = [head]
+    for i, (name, place) in enumerate(MARKS.items()):
+        mark, use = name.split(",")
+        there = grid.to_level(np.array([place]))[0] + (2.0 if mark == wrong else 0.0)
+        seen = np.array(place) + 0.01 * rng.normal(size=3)
+        in_map = ",".join(f"{v:.3f}" for v in seen) if i < picked else ",,"
+        lines.append(f"{mark},{there[0]:.4f},{there[1]:.4f},{there[2]:.4f},{in_map},{use}")
+    path = tmp_path / "grid.csv"
+    path.write_text("\n".join(lines), encoding="utf-8")
+    return path, grid
+
+
+def test_marks_seen_in_the_map_put_it_on_a_site_grid_without_gnss(tmp_path):
+    path, grid = site_grid(tmp_path)
+    found = placed(None, control_points=path)
+    points = np.random.default_rng(3).uniform(-15, 15, (100, 3))
+    off = found.to_projected(points) - grid.to_level(points)
+    assert np.abs(off).max() < 0.03
+    assert np.abs(off[:, 2]).max() < 0.006, "the floor around the marks says how high they are"
+    assert found.crs_wkt is None
+    (check,) = [row for row in found.record["control_points"] if row["id"] == "floor2"]
+    assert check["use"] == "check"
+    assert check["picked_off"] < 0.04
+
+
+def test_a_mark_that_disagrees_is_named_and_not_believed(tmp_path):
+    path, grid = site_grid(tmp_path, wrong="floor3", picked=8)
+    found = placed(None, control_points=path)
+    assert (
+        np.abs(found.to_projected(np.zeros((1, 3))) - grid.to_level(np.zeros((1, 3)))).max() < 0.03
+    )
+    (said,) = [text for text in found.warnings if "other marks" in text]
+    assert said.startswith("floor3 was seen 3.4")
+
+
+def test_marks_on_a_grid_that_nobody_has_seen_in_the_map_say_the_way_out(tmp_path):
+    path, _ = site_grid(tmp_path, picked=0)
+    with pytest.raises(NotEnoughDataError, match="map_x, map_y, map_z"):
+        placed(None, control_points=path)
+
+
+def test_one_mark_is_too_few_without_gnss(tmp_path):
+    path, _ = site_grid(tmp_path, picked=1)
+    with pytest.raises(NotEnoughDataError, match="1 of 8 control points"):
+        placed(None, control_points=path)
+
+
+def test_marks_in_a_named_system_give_the_map_its_system(tmp_path):
+    rng = np.random.default_rng(4)
+    places = on_earth(np.array(list(MARKS.values())))
+    lines = ["id;lat;lon;height;map_x;map_y;map_z"]
+    for name, place, at in zip(MARKS, places, MARKS.values(), strict=True):
+        seen = ";".join(f"{v:.3f}" for v in np.array(at) + 0.01 * rng.normal(size=3))
+        lines.append(f"{name.split(',')[0]};{place[1]:.10f};{place[0]:.10f};{place[2]:.4f};{seen}")
+    path = tmp_path / "marks.csv"
+    path.write_text("\n".join(lines), encoding="utf-8")
+    found = placed(None, control_points=path, epsg=25832)
+    assert 'AUTHORITY["EPSG","25832"]' in found.crs_wkt
+    assert np.abs(errors(found)).max() < 0.04

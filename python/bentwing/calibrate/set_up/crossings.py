@@ -19,7 +19,7 @@ from scipy.spatial.transform import Rotation
 from bentwing.base import geometry
 from bentwing.calibrate.set_up.axes import angle_between
 from bentwing.calibrate.set_up.rotations import spread
-from bentwing.calibrate.set_up.scans import attitudes, beams
+from bentwing.calibrate.set_up.scans import MOST_DIFFERENT, attitudes, beams
 from bentwing.recording.batches import ImuBatch
 
 if TYPE_CHECKING:
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 
 PAIRS, LONGEST = 2000, 0.6  # of scans that are compared, and s between them
 ACROSS = np.sin(np.radians(10.0))  # planes that cross at a smaller angle tell nothing
-MOST_DIFFERENT = 0.5  # of the logarithm of a range: what one scan does not see counts no more
 FEWEST = 200  # crossings; what fewer say is moved towards what is usual
 COARSE, REFINED = 1000, 24  # rotations that are compared, and the best of them
 APART = np.radians(15.0)  # between mounts that are told apart
@@ -62,7 +61,8 @@ class Crossings:
         self._scans, self._imu = scans, imu
         random = np.random.default_rng(0)
         lags = max(2, round(LONGEST / scans.interval))
-        first = random.integers(0, len(scans.times), PAIRS)
+        # At rest scans are alike, which speaks for any delay that has them turn.
+        first = random.choice(np.flatnonzero(scans.changing), PAIRS)
         later = first + random.integers(1, lags, PAIRS)
         inside = later < len(scans.times)
         self._first, self._later = first[inside], later[inside]

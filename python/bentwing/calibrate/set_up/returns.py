@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing.calibrate.set_up.scans import N_BEAMS, attitudes
+from bentwing.calibrate.set_up.scans import MOST_DIFFERENT, N_BEAMS, attitudes
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 SHORTEST, LONGEST = 0.1, 2.0  # s until the head comes back
 LARGEST_DELAY = 3.0  # s
 BACK, AWAY = np.radians(4.0), np.radians(20.0)
-MOST_DIFFERENT = 0.5  # of the logarithm of a range: what comes into view counts no more
 FEWEST = 100
 NEARBY = 0.15  # s between delays that are worth a trial
 

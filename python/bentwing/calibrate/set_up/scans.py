@@ -15,7 +15,10 @@ if TYPE_CHECKING:
     from bentwing.recording import ImuBatch, LidarBatch
 
 N_BEAMS = 120
+MOST_DIFFERENT = 0.5  # of the logarithm of a range: what one scan does not see counts no more
 STEP = 0.01  # s between scans that are compared, at most the scan rate
+SOON = 0.1  # s in which a head that turns sees something else
+STILL = 0.3  # of what scans usually change in that time
 
 
 class Scans:
@@ -40,6 +43,19 @@ class Scans:
         self.times = np.arange(middles[0], middles[-1], self.interval)
         nearest = np.clip(np.searchsorted(middles, self.times), 0, len(middles) - 1)
         self.ranges = profiles[nearest]
+
+    @property
+    def changing(self) -> NDArray[np.bool_]:
+        """(S,) which scans see something else than those soon after: whether the head turns."""
+        lag = min(max(1, round(SOON / self.interval)), len(self.times) - 1)
+        if lag < 1:
+            return np.ones(len(self.times), np.bool_)
+        apart = np.abs(self.ranges[lag:] - self.ranges[:-lag])
+        known = np.isfinite(apart)
+        total = np.where(known, np.minimum(apart, MOST_DIFFERENT), 0.0).sum(axis=1)
+        changes = total / np.maximum(known.sum(axis=1), 1)
+        changes = np.append(changes, np.full(lag, changes[-1]))
+        return np.asarray(changes >= STILL * np.median(changes))
 
 
 def beams(azimuths: NDArray[np.float64]) -> NDArray[np.int64]:

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 _HEADER = 375  # bytes of the longest header, of version 1.4
 _SHORTEST = 227  # of the shortest one
 _VLR, _EVLR = 54, 60  # bytes of their headers
+_MOST_RECORDS = 10_000  # files have some dozen; each becomes an object
 _IS_COMPRESSED = 0x80  # of the point format
 
 
@@ -38,9 +39,11 @@ def require_sound_las(path: Path) -> None:
         is_new = head[24:26] >= b"\1\4"
         if is_new:
             n_points = n_more
-            _require(path, not n_evlrs or evlrs + n_evlrs * _EVLR <= size, "extended records")
+            fits = n_evlrs <= _MOST_RECORDS and evlrs + n_evlrs * _EVLR <= size
+            _require(path, not n_evlrs or fits, "extended records")
         _require(path, _SHORTEST <= header_size <= start <= size, "a header")
-        _require(path, n_records * _VLR <= start - header_size, "records")
+        fits = n_records <= _MOST_RECORDS and n_records * _VLR <= start - header_size
+        _require(path, fits, "records")
         if not point_format & _IS_COMPRESSED:
             _require(path, start + n_points * record_length <= size, "points")
         elif n_points:

@@ -23,7 +23,7 @@ from bentwing.run import pipeline
 from bentwing.run.found import Found
 from bentwing.run.settings import RunSettings, run_settings
 
-BENTWING = "from bentwing.cli.main import run; run()"
+BENTWING = "from bentwing.cli.entry import run; run()"
 
 
 @pytest.fixture

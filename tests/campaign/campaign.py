@@ -82,7 +82,12 @@ class Ground:
             if form != "bag":
                 found = next((folder / form).rglob(f"*.{form}"))
                 shutil.move(found, folder / "bag" / name)
-        healthy = Healthy(folder / "bag", folder / "run")
+        return cls.of(folder / "bag", folder / "run")
+
+    @classmethod
+    def of(cls, recordings: Path, run_folder: Path) -> Ground:
+        """Map the bag in a folder of recordings."""
+        healthy = Healthy(recordings, run_folder)
         payload = ["-p", healthy.payload, "--duration", "6", "-q"]
         mapped = run(["map", healthy.folder / RECORDINGS[0], *payload, "-o", healthy.run])
         _require(mapped)

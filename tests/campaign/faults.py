@@ -40,6 +40,11 @@ class Healthy:
     run: Path
 
     @property
+    def recordings(self) -> list[str]:
+        """Names of the recordings that there are."""
+        return [name for name in RECORDINGS if (self.folder / name).exists()]
+
+    @property
     def payload(self) -> Path:
         """The description of the head."""
         return self.folder / "payload.yaml"
@@ -99,7 +104,9 @@ def _damaged(source: Path, target: Path, draw: random.Random) -> Path:
 
 def in_bytes(healthy: Healthy, folder: Path, draw: random.Random) -> Attempt:
     """Any input of any command with its bytes damaged."""
-    name = draw.choice([*RECORDINGS, "payload.yaml", "map.laz", "trajectory.txt", "run.json"])
+    name = draw.choice(
+        [*healthy.recordings, "payload.yaml", "map.laz", "trajectory.txt", "run.json"]
+    )
     if name in RECORDINGS:
         given = _damaged(healthy.folder / name, folder / name, draw)
         command = draw.choice(
@@ -130,7 +137,7 @@ def in_messages(healthy: Healthy, folder: Path, draw: random.Random) -> Attempt:
 
 def in_headers(healthy: Healthy, folder: Path, draw: random.Random) -> Attempt:
     """Numbers in an input that announce what is not there: sizes, counts, offsets."""
-    name = draw.choice([*RECORDINGS, "map.laz"])
+    name = draw.choice([*healthy.recordings, "map.laz"])
     source = healthy.run / name if name == "map.laz" else healthy.folder / name
     data = bytearray(source.read_bytes())
     for _ in range(draw.choice([1, 3])):

@@ -8,6 +8,7 @@ import sys
 import tempfile
 import time
 from collections import Counter, defaultdict
+from contextlib import suppress
 from pathlib import Path
 
 from campaign.campaign import Ground, Outcome, tried
@@ -23,7 +24,7 @@ def main() -> int:
     asked = parser.parse_args()
     outcomes = defaultdict[str, list[Outcome]](list)
     started = time.monotonic()
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as folder, suppress(KeyboardInterrupt):
         ground = Ground.made(Path(folder))
         for seed in range(asked.first_seed, asked.first_seed + asked.runs):
             outcome = tried(seed, ground, tuple(asked.kinds))
@@ -31,10 +32,10 @@ def main() -> int:
             for one in outcome.findings:
                 print(f"seed {one.seed} ({one.kind}): {one.what}\n  {one.command}\n  {one.said}")
             sys.stdout.flush()
-    print(table(outcomes))
+    n = sum(map(len, outcomes.values()))
     minutes = (time.monotonic() - started) / 60
-    seeds = f"seeds {asked.first_seed} to {asked.first_seed + asked.runs - 1}"
-    print(f"\n{asked.runs} runs, {seeds}, {minutes:.0f} minutes")
+    print(table(outcomes))
+    print(f"\n{n} runs, seeds from {asked.first_seed} on, {minutes:.0f} minutes")
     return int(any(o.findings for found in outcomes.values() for o in found))
 
 

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 MOST_MB = 500  # of a command that refuses its input
 MOST_MB_OF_OTHERS = 2000
 SLACK = 30.0  # s beyond what the healthy command takes
+SEARCH = 120.0  # s, more than the search for the set-up of a 2D head takes, which doubts begin
 MAPPED = ("trajectory.txt", "map.laz")
 ORDINARY = frozenset({0, 1, 2, 3, 4, 130})
 _SIGNS = (
@@ -123,7 +124,7 @@ def _shown(part: object) -> str:
 
 def _problems(attempt: Attempt, ground: Ground, kind: str) -> Iterator[Ended | str]:
     """Yield how the command ended, then what is wrong with that."""
-    longest = ground.seconds * 2 + SLACK
+    longest = ground.seconds * 2 + SLACK + SEARCH
     others: list[Ended] = []
     second = threading.Thread(target=lambda: others.append(run(attempt.second or [])))
     if attempt.second is not None:

@@ -20,7 +20,7 @@ from bentwing.base.errors import BentwingError
 from bentwing.base.run_record import finished_record, read_record
 from bentwing.base.trajectory import Trajectory
 from bentwing.base.tum import read_poses
-from bentwing.closing.georeference.control_points import read_control_points
+from bentwing.closing.georeference.control_point_file import read_control_points
 from bentwing.closing.pose_graph import read_g2o
 from bentwing.evaluate.track import read_track
 from bentwing.map.chunk import MapChunk
@@ -194,6 +194,17 @@ TEXTS = (
 )
 
 
+def outcome(read, path):
+    """None where a file is read, else what its reader raises: any error of ours is one."""
+    try:
+        read(path)
+    except BentwingError:
+        return BentwingError
+    except Exception as error:
+        return error
+    return None
+
+
 def changed(content, edits):
     """Bytes with changes at shares of their length."""
     data = bytearray(content)
@@ -251,7 +262,4 @@ def sound(tmp_path_factory):
 def test_a_file_with_changed_bytes_is_read_or_refused(tmp_path, sound, name, edits):
     path = tmp_path / name
     path.write_bytes(changed(sound[name], edits))
-    try:
-        READERS[name][1](path)
-    except Exception as error:
-        assert isinstance(error, BentwingError)
+    assert outcome(READERS[name][1], path) in {None, BentwingError}

@@ -56,7 +56,7 @@ NUMBERS = [
     for name, field in model.model_fields.items()
     if parts(field.annotation) & {int, float}
     and not list(inner(field.annotation))
-    and not parts(getattr(field.annotation, "__origin__", None)) & {tuple, dict}
+    and not {getattr(p, "__origin__", p) for p in parts(field.annotation)} & {tuple, dict}
 ]
 
 

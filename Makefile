@@ -3,6 +3,8 @@
 
 PYTHON ?= python3
 WORKERS ?= 2
+RUNS ?= 1000
+FIRST_SEED ?= 1
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -95,8 +97,8 @@ test-all: test-rust $(CORE) ## also the slow ones
 	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile -m "slow or not slow"
 
 .PHONY: campaign
-campaign: $(CORE) ## commands with faulty inputs and stops, each in a process that is measured
-	$(BIN)/python -m pytest -m "slow or not slow" tests/campaign -v
+campaign: $(CORE) ## commands with faults drawn by seeds, each in a process that is measured: a table
+	PYTHONPATH=tests $(BIN)/python -m campaign --runs $(RUNS) --first-seed $(FIRST_SEED)
 
 ##@ Look after the code
 

@@ -10,6 +10,7 @@ import sys
 import tempfile
 import time
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -42,6 +43,7 @@ def run(
     *,
     meanwhile: Callable[[subprocess.Popen[bytes]], None] | None = None,
     environment: dict[str, str] | None = None,
+    limits: Sequence[tuple[str, int]] = (),
     longest: float = LONGEST,
 ) -> Ended:
     """Run `bentwing` with these arguments.
@@ -50,6 +52,7 @@ def run(
     ----------
     meanwhile : is called once the process has begun, to disturb it
     environment : variables besides those of this process
+    limits : resources that it may have, by the names of the module `resource`
     """
     with tempfile.TemporaryFile() as said:
         started = time.monotonic()
@@ -60,6 +63,7 @@ def run(
             stderr=said,
             env={**os.environ, **(environment or {})},
             start_new_session=True,
+            preexec_fn=partial(_limit, limits) if limits else None,
         )
         if meanwhile is not None:
             meanwhile(process)
@@ -68,6 +72,13 @@ def run(
         text = said.read().decode("utf-8", "replace")
     code = None if status is None else os.waitstatus_to_exitcode(status)
     return Ended(code, text, time.monotonic() - started, peak)
+
+
+def _limit(limits: Sequence[tuple[str, int]]) -> None:
+    import resource
+
+    for name, most in limits:
+        resource.setrlimit(getattr(resource, name), (most, most))
 
 
 def _wait(process: subprocess.Popen[bytes], until: float) -> tuple[int | None, float]:

@@ -8,7 +8,13 @@ from pathlib import Path
 import pytest
 import yaml
 
-from bentwing.base.errors import BentwingError, EstimationError, RecordingError, UsageError
+from bentwing.base.errors import (
+    BentwingError,
+    EstimationError,
+    InputError,
+    RecordingError,
+    UsageError,
+)
 from bentwing.cli.main import run_command
 from bentwing.closing import GeoreferenceSettings
 from bentwing.map.clean import CleanSettings
@@ -17,7 +23,7 @@ from bentwing.run import pipeline
 from bentwing.run.found import Found
 from bentwing.run.settings import RunSettings, run_settings
 
-BENTWING = "from bentwing.cli.main import run; run()"
+BENTWING = "from bentwing.cli.entry import run; run()"
 
 
 @pytest.fixture
@@ -147,7 +153,23 @@ def test_every_expected_error_has_its_exit_code_and_no_traceback(monkeypatch, ca
 def test_a_full_disk_is_told_as_such(monkeypatch, capsys):
     failing(monkeypatch, OSError(28, "No space left on device", "out/map.laz"))
     assert run_command(["map", "a.mcap", "-o", "out"]) == 1
-    assert capsys.readouterr().err == "bentwing: error: out/map.laz: No space left on device\n"
+    said = capsys.readouterr().err
+    assert said.startswith("bentwing: error: out/map.laz: No space left on device; make room there")
+
+
+@pytest.mark.parametrize("name", ["rec\x1b[2J.bag", "a\nb.bag", "caf\udce9.bag"])
+def test_names_that_nothing_can_show_are_refused_before_any_work(monkeypatch, capsys, name):
+    failing(monkeypatch, AssertionError("it began"))
+    assert run_command(["map", name, "-o", "out"]) == 2
+    said = capsys.readouterr().err
+    assert "rename the file" in said
+    assert said.rstrip("\n").isprintable()
+
+
+def test_what_an_error_says_of_a_file_cannot_command_the_terminal(monkeypatch, capsys):
+    failing(monkeypatch, InputError("no field \x1b]0;title\x07 in it\nsecond line"))
+    run_command(["map", "a.mcap", "-o", "out"])
+    assert "no field \\x1b]0;title\\x07 in it\nsecond" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("debug", [False, True])

@@ -296,7 +296,13 @@ def test_clocks_that_have_nothing_to_do_with_each_other(refuse, changed_bag, shi
 
 
 def test_too_short_a_part(refuse, office):
-    refuse(office / "recording.bag", "less than 1.5 s", options=("--duration", "0.3"), code=4)
+    refuse(
+        office / "recording.bag",
+        "less than 1.5 s",
+        "lidar points from 0.0",
+        options=("--duration", "0.3"),
+        code=4,
+    )
 
 
 def test_a_part_behind_the_end(bentwing, office, tmp_path):

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
 """A run that is killed goes on where it was, and ends with the same bytes."""
 
+import hashlib
+import io
 import json
 import random
 import subprocess
@@ -9,6 +11,10 @@ import time
 
 import numpy as np
 import pytest
+
+from bentwing.run.checkpoint import Checkpoint
+from bentwing.run.folder import RunFolder
+from bentwing.run.settings import RunSettings
 
 RESULTS = ("trajectory.txt", "odometry.txt", "map.laz", "map_top.png")
 
@@ -109,6 +115,49 @@ def test_a_damaged_checkpoint_begins_anew(asked, killed, undisturbed):
     finished(start(asked, killed, "--resume"))
     assert (killed / "map.laz").read_bytes() == (undisturbed / "map.laz").read_bytes()
     assert any("begins anew" in warning for warning in record_of(killed)["warnings"])
+
+
+@pytest.fixture
+def restored(killed):
+    """A function: what a run that resumes makes of a checkpoint's bytes."""
+    settings = RunSettings()
+    with RunFolder(killed, settings.to_json(), resume=True) as folder:
+
+        def restore(content):
+            (killed / "checkpoint.npz").write_bytes(content)
+            return Checkpoint(folder, settings).restore(resume=True)
+
+        yield restore
+
+
+def test_no_damage_of_a_checkpoint_is_taken_for_a_stage_that_is_done(killed, restored):
+    whole, flips = (killed / "checkpoint.npz").read_bytes(), random.Random(0)
+    for _ in range(200):
+        at, bit = flips.randrange(len(whole)), 1 << flips.randrange(8)
+        stage, found = restored(whole[:at] + bytes([whole[at] ^ bit]) + whole[at + 1 :])
+        assert stage is None
+        assert "begins anew" in found.stage_warnings[0]
+    for size in (0, 1, 31, 32, 33, len(whole) // 2, len(whole) - 1):
+        assert restored(whole[:size])[0] is None
+
+
+def of_another_program(described, **arrays):
+    data = io.BytesIO()
+    np.savez(data, described=np.array(json.dumps(described)), **arrays)
+    return data.getvalue() + hashlib.sha256(data.getvalue()).digest()
+
+
+def test_a_checkpoint_of_something_else_begins_anew(killed, restored):
+    with np.load(killed / "checkpoint.npz") as stored:
+        arrays = {name: stored[name] for name in stored.files}
+    described = json.loads(str(arrays.pop("described")))
+    settings = {k: v for k, v in RunSettings().to_json().items() if k != "threads"}
+    described["asked"] = {**settings, "inputs": []}
+    assert restored(of_another_program(described, **arrays))[0] is not None
+    for part in ("stage", "files", "timings", "calibration", "estimate", "stage_warnings"):
+        for value in (None, "x", {"a": [1]}, 1e300, [[]]):
+            changed = {**described, part: value}
+            assert restored(of_another_program(changed, **arrays))[0] is None, (part, value)
 
 
 def test_the_checkpoint_keeps_every_bit(killed):

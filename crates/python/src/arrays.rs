@@ -111,6 +111,22 @@ pub(crate) fn finite_number(name: &str, value: f64) -> PyResult<f64> {
     Err(PyValueError::new_err(message))
 }
 
+/// Longest time that is carried on at once, s; samples come a hundred times a second, and what is
+/// carried on for longer than this has left every place that could be found again.
+const LONGEST_STEP: f64 = 3600.0;
+
+/// A time to carry on to from another, for which there will be memory.
+pub(crate) fn reachable(name: &str, from: f64, until: f64) -> PyResult<f64> {
+    if finite_number(name, until)? - from <= LONGEST_STEP {
+        return Ok(until);
+    }
+    let message = format!(
+        "{name}: expected a time up to {LONGEST_STEP} s after {from} s, got {until} s; times are in \
+         seconds"
+    );
+    Err(PyValueError::new_err(message))
+}
+
 /// A finite three-vector.
 pub(crate) fn finite_vector(name: &str, value: [f64; 3]) -> PyResult<Vector3<f64>> {
     if value.iter().all(|v| v.is_finite()) {

@@ -10,8 +10,8 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::arrays::{
-    angles as checked_angles, finite_number, finite_rows, finite_vector, times as checked_times,
-    to_array2, unit_quaternion, vectors, xyzw,
+    angles as checked_angles, finite_number, finite_rows, finite_vector, reachable,
+    times as checked_times, to_array2, unit_quaternion, vectors, xyzw,
 };
 use crate::errors::{detached, kalman_error};
 
@@ -172,7 +172,7 @@ impl KalmanFilter {
         let times = checked_times("times", &times, times.len())?;
         let gyro = vectors(finite_rows("gyro", &gyro)?);
         let accel = vectors(finite_rows("accel", &accel)?);
-        let until = finite_number("until", until)?;
+        let until = reachable("until", self.0.time(), until)?;
         if gyro.len() != times.len() || accel.len() != times.len() {
             let message = format!(
                 "gyro, accel: expected {} rows as times has, got {} and {}",

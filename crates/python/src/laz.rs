@@ -84,7 +84,7 @@ impl LazCompressor {
             waiting.drain(..n);
             Ok::<(), std::io::Error>(())
         };
-        Ok(in_pool(py, threads, work)??)
+        in_pool(py, threads, work)?.map_err(io_error)
     }
 
     /// Writes what is held back and the table of chunks.
@@ -107,9 +107,17 @@ fn begun(file: &mut Option<ParLasZipCompressor<File>>) -> PyResult<&mut ParLasZi
     file.as_mut().ok_or_else(missing)
 }
 
+/// An `OSError` with its number, by which Python tells a full disk from others.
+fn io_error(error: std::io::Error) -> PyErr {
+    match error.raw_os_error() {
+        Some(number) => PyOSError::new_err((number, error.to_string())),
+        None => error.into(),
+    }
+}
+
 fn os_error(error: LasZipError) -> PyErr {
     match error {
-        LasZipError::IoError(e) => e.into(),
+        LasZipError::IoError(e) => io_error(e),
         other => PyOSError::new_err(other.to_string()),
     }
 }

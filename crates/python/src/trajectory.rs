@@ -11,7 +11,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::arrays::{
-    finite_number, finite_rows, times, to_array2, unit_quaternion, vector, vectors, xyzw,
+    finite_number, finite_rows, reachable, times, to_array2, unit_quaternion, vector, vectors, xyzw,
 };
 use crate::errors::in_pool;
 use crate::globals::Globals;
@@ -166,7 +166,7 @@ impl Samples {
         globals: &Globals,
         until: f64,
     ) -> PyResult<(Self, usize)> {
-        let until = finite_number("until", until)?;
+        let until = reachable("until", self.0.end(), until)?;
         let mut trajectory = self.0.clone();
         let n_blind = match imu {
             None => {

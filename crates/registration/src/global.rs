@@ -30,6 +30,9 @@ pub fn register_globally(
     problem: &GlobalProblem<'_>,
     settings: &Settings,
 ) -> Result<GlobalRegistration, SolveError> {
+    for piece in &problem.pieces {
+        settings.require_dense(&piece.trajectory)?;
+    }
     let states = problem.pieces.iter().map(|p| p.state(settings));
     let mut states: Vec<State<'_>> = states.collect();
     let joint = Joint::new(&states);

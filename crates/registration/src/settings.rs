@@ -1,7 +1,13 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Settings of a registration; their defaults live in the Python package.
 
+use bentwing_trajectory::Trajectory;
+
+use crate::SolveError;
 use crate::neighbors::Search;
+
+/// How far a finite difference may reach, in knot intervals: less than one by more than rounding.
+const LONGEST_REACH: f64 = 0.999;
 
 /// Noise of one inertial sample of the trajectory's rate: density × √rate.
 #[derive(Clone, Copy, Debug)]
@@ -59,6 +65,17 @@ impl Settings {
         }
     }
 
+    /// Refuses samples whose second differences reach over more than one knot: a row has places for
+    /// the control points of two neighbouring intervals only.
+    pub(crate) fn require_dense(&self, trajectory: &Trajectory) -> Result<(), SolveError> {
+        let (dt, knot_interval) = (trajectory.dt(), self.knot_interval);
+        // Not the opposite of what fits, so that NaN is refused too.
+        if 2.0 * dt < LONGEST_REACH * knot_interval {
+            return Ok(());
+        }
+        Err(SolveError::Sparse { dt, knot_interval })
+    }
+
     /// Scale of the Cauchy weight in an outer iteration.
     pub(crate) fn cauchy_scale_at(&self, n_outer: usize) -> f64 {
         if n_outer == 0 {
@@ -66,5 +83,32 @@ impl Settings {
         } else {
             self.cauchy_scale
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bentwing_trajectory::so3;
+    use nalgebra::Vector3;
+
+    use super::*;
+    use crate::constraints::testing::settings;
+
+    #[test]
+    fn samples_that_a_row_cannot_hold_are_refused_with_both_intervals() {
+        let every = |dt| {
+            let rotations = vec![so3::exp(&Vector3::zeros()); 3];
+            Trajectory::new(0.0, dt, vec![Vector3::zeros(); 3], rotations).unwrap()
+        };
+        let with = |knot_interval| Settings {
+            knot_interval,
+            ..settings()
+        };
+        assert_eq!(with(0.2).require_dense(&every(0.099)), Ok(()));
+        for (dt, knot_interval) in [(0.1, 0.2), (0.25, 0.2), (1e4, 0.2), (0.01, 0.02)] {
+            let refused = Err(SolveError::Sparse { dt, knot_interval });
+            assert_eq!(with(knot_interval).require_dense(&every(dt)), refused);
+        }
+        assert!(with(f64::NAN).require_dense(&every(0.01)).is_err());
     }
 }

@@ -121,11 +121,13 @@ impl Problem<'_> {
 /// Corrects a trajectory and its calibration (Kaul 2015, section 2.1).
 ///
 /// # Errors
-/// When the normal equations are singular or hold values that are not finite.
+/// When the samples are too sparse for the knots, or the normal equations are singular or hold values
+/// that are not finite.
 pub fn register_window(
     problem: &Problem<'_>,
     settings: &Settings,
 ) -> Result<Registration, SolveError> {
+    settings.require_dense(&problem.trajectory)?;
     let mut state = problem.state(settings);
     let ties = problem.ties(&state.spline);
     let (mut solver, mut matches) = (Solver::default(), Vec::new());

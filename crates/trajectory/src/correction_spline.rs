@@ -131,6 +131,18 @@ mod tests {
             let direct = value(t - d / 2.0) - 2.0 * value(t) + value(t + d / 2.0);
             prop_assert!((by_weights - direct).abs() < 1e-13);
         }
+
+        #[test]
+        fn a_stencil_shorter_than_a_knot_interval_has_its_control_points(
+            start in -1e5..1e5_f64, h in 0.02..10.0_f64, share in 0.0..0.4995_f64, u in 0.0..1.0_f64,
+        ) {
+            let (end, dt) = (start + 7.3 * h, share * h);
+            let spline = CorrectionSpline::covering(start, end, h);
+            let t = start + u * (end - start);
+            let stencil = spline.stencil([t - dt, t, t + dt], [1.0, -2.0, 1.0]);
+            prop_assert!(stencil.first + 5 <= spline.n_controls());
+            prop_assert!(stencil.weights.iter().sum::<f64>().abs() < 1e-12);
+        }
     }
 
     #[test]

@@ -28,21 +28,41 @@ def publish(temporary: Path, path: Path) -> None:
 
 
 @contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Let what the system says while a file is written name the file, which only opening it does.
+
+    Raises
+    ------
+    OSError
+    """
+    try:
+        yield
+    except OSError as error:
+        if error.filename is not None or error.errno is None:
+            raise
+        raise OSError(error.errno, os.strerror(error.errno), str(path)) from error
+
+
+@contextmanager
 def atomic_path(path: Path) -> Iterator[Path]:
     """Yield a temporary name in the same folder; rename it at the end, remove it on failure."""
     temporary = temporary_name(path)
     try:
-        yield temporary
-        publish(temporary, path)
+        with writing(path):
+            yield temporary
+            publish(temporary, path)
     except BaseException:
         temporary.unlink(missing_ok=True)
         raise
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a whole text file atomically, UTF-8."""
+    """Write a whole text file atomically, UTF-8.
+
+    What no UTF-8 can say, as bytes of the name of a folder, is written with a backslash.
+    """
     with atomic_path(Path(path)) as temporary:
-        temporary.write_text(text, encoding="utf-8", newline="\n")
+        temporary.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
 
 
 def write_bytes(path: Path, data: bytes) -> None:

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from typing import IO, TYPE_CHECKING, Protocol
 
 from bentwing.base.arguments import instance
+from bentwing.base.printable import printable
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -73,7 +74,7 @@ class LineProgress(Progress):
         self._print(text)
 
     def _print(self, line: str) -> None:
-        print(line, file=self._stream or sys.stderr, flush=True)
+        print(printable(line), file=self._stream or sys.stderr, flush=True)
 
 
 class BarProgress(Progress):
@@ -117,7 +118,7 @@ class BarProgress(Progress):
 
     def note(self, text: str) -> None:
         """Print a line between the bars."""
-        print(text, file=sys.stderr, flush=True)
+        print(printable(text), file=sys.stderr, flush=True)
 
 
 def as_progress(value: Progress | None) -> Progress:

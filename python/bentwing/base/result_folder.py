@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import json
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -177,7 +177,9 @@ class ResultFolder:
     ) -> None:
         try:
             if error is not None and not self._is_complete:
-                self._write({**self._begun(), "reason": reason_of(error)})
+                # On a disk that is full, the record goes on saying that the result is not complete.
+                with suppress(OSError) if isinstance(error, OSError) else nullcontext():
+                    self._write({**self._begun(), "reason": reason_of(error)})
         finally:
             self._lock.release()
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from array import array
 from decimal import Decimal, InvalidOperation
 from typing import TYPE_CHECKING
 
@@ -11,6 +12,7 @@ import numpy as np
 from bentwing.base.atomic import write_text
 from bentwing.base.clock import NS_PER_S, Clock
 from bentwing.base.errors import InputError
+from bentwing.base.regular_file import require_regular
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -22,7 +24,7 @@ _POSE_COLUMNS = 8
 _KITTI_COLUMNS = 12
 _LATEST_NS = 2**62  # beyond it differences of stamps overflow
 _LARGEST_EXPONENT = 30  # of ten, of a stamp in any unit; times the nanosecond's 0 it is 0
-_MOST_BYTES = 2**30
+MOST_BYTES = 2**30  # of a day at 100 Hz
 _LONGEST_LINE = 10_000  # characters; what is longer is read as several lines
 
 
@@ -122,11 +124,11 @@ def read_rows(
     InputError
         If the file cannot be read, or a line has another form.
     """
-    stamps_ns: list[int] = []
-    rows: list[list[float]] = []
+    # As numbers, not as objects: a day has millions of poses.
+    stamps_ns, rows, width = array("q"), array("d"), 0
     for number, line in enumerate(read_lines(path), start=1):
         fields = line.replace(",", " ").split()
-        if not fields or fields[0].startswith("#") or (not rows and _is_heading(fields)):
+        if not fields or fields[0].startswith("#") or (not stamps_ns and _is_heading(fields)):
             continue
         if len(fields) == _KITTI_COLUMNS and len(fields) not in widths:
             msg = (
@@ -135,20 +137,21 @@ def read_rows(
             )
             raise InputError(msg)
         fields = fields[: max(widths)] if ignore_more else fields
-        expected = (len(rows[0]) + 1,) if rows else widths
         try:
             stamps_ns.append(_stamp_ns(fields[0], NS_PER_S // per_second))
-            rows.append([float(value) for value in fields[1:]])
-            complete = len(fields) in expected
+            rows.extend([float(value) for value in fields[1:]])
+            complete = len(fields) in ((width,) if width else widths)
         except (InvalidOperation, ValueError):
             complete = False
+        width = len(fields)
         if not complete:
-            msg = f"{path}, line {number}: expected `{layout}`, found {line[:80]!r}"
+            unit = " with t in seconds" if per_second == 1 else ""
+            msg = f"{path}, line {number}: expected `{layout}`{unit}, found {line[:80]!r}"
             raise InputError(msg)
     if not stamps_ns:
         msg = f"{path}: holds no pose; expected lines of `{layout}`"
         raise InputError(msg)
-    return np.array(stamps_ns, dtype=np.int64), np.array(rows)
+    return np.array(stamps_ns), np.array(rows).reshape(len(stamps_ns), width - 1)
 
 
 def read_lines(path: Path) -> Iterator[str]:
@@ -159,7 +162,7 @@ def read_lines(path: Path) -> Iterator[str]:
     InputError
         If it is no file of text, or too large to be one of poses.
     """
-    require_file(path)
+    require_regular(path, MOST_BYTES)
     try:
         with path.open(encoding="utf-8") as file:
             while line := file.readline(_LONGEST_LINE):
@@ -167,21 +170,6 @@ def read_lines(path: Path) -> Iterator[str]:
     except (OSError, UnicodeDecodeError) as error:
         msg = f"{path}: not readable as a trajectory ({error})"
         raise InputError(msg) from error
-
-
-def require_file(path: Path) -> None:
-    """Refuse what is no file, as a device or a pipe, or too large to hold poses.
-
-    Raises
-    ------
-    InputError
-    """
-    if path.exists() and not path.is_file():
-        msg = f"{path}: is not a file"
-        raise InputError(msg)
-    if path.exists() and (size := path.stat().st_size) > _MOST_BYTES:
-        msg = f"{path}: has {size} bytes, more than any trajectory"
-        raise InputError(msg)
 
 
 def _stamp_ns(text: str, unit_ns: int) -> int:

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import yaml
 
+from bentwing.base.regular_file import require_regular
+
 if TYPE_CHECKING:
     from pathlib import Path
 
@@ -56,9 +58,7 @@ def read_yaml(path: Path, advice: str, kind: type[InputError]) -> object:
         Of this kind, if the file cannot be read or is not YAML.
     """
     try:
-        if path.exists() and not path.is_file():
-            msg = f"{path}: is not a file; give a YAML text file"
-            raise kind(msg)
+        require_regular(path, kind=kind)
         with path.open("rb") as file:
             data = file.read(MOST_OF_YAML + 1)
         if len(data) > MOST_OF_YAML:

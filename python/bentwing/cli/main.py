@@ -3,15 +3,20 @@
 
 from __future__ import annotations
 
+import errno
+import io
 import os
 import signal
 import sys
 import traceback
+import unicodedata
+import warnings
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from bentwing.base.errors import BentwingError, UsageError
+from bentwing.base.printable import printable
 from bentwing.cli.command import CONTEXT, closing
 from bentwing.cli.commands import LazyCommands
 from bentwing.cli.mistakes import Mistake, explain
@@ -22,6 +27,9 @@ if TYPE_CHECKING:
 INTERRUPTED = 130
 _UNEXPECTED = 70  # EX_SOFTWARE of sysexits.h
 _DEBUG = "BENTWING_DEBUG"
+
+_NO_ROOM = "; make room there, or name another folder"
+_REMEDIES = {errno.ENOSPC: _NO_ROOM, errno.EDQUOT: _NO_ROOM, errno.EFBIG: _NO_ROOM}
 
 _EXAMPLES = (
     "bentwing simulate courtyard -o recording --duration 30",
@@ -71,6 +79,10 @@ def run() -> None:
         number = getattr(signal, name, None)  # Windows has no SIGHUP
         if number is not None and signal.getsignal(number) is signal.SIG_DFL:
             signal.signal(number, _interrupt)
+    if isinstance(sys.stdout, io.TextIOWrapper):  # the name of a folder need not be UTF-8
+        sys.stdout.reconfigure(errors="backslashreplace")
+    if not (sys.warnoptions or os.environ.get(_DEBUG)):  # they speak of code, to programmers
+        warnings.simplefilter("ignore")
     sys.exit(run_command(sys.argv[1:]))
 
 
@@ -86,6 +98,7 @@ def run_command(arguments: list[str]) -> int:
         run_command(["--help"])
         return UsageError.exit_code
     try:
+        _require_plain(arguments)
         result = app(arguments, prog_name="bentwing", standalone_mode=False)
     except BentwingError as error:
         return _fail(str(error), error.exit_code)
@@ -99,7 +112,9 @@ def run_command(arguments: list[str]) -> int:
         return 0
     except OSError as error:
         where = f"{error.filename}: " if error.filename else ""
-        return _fail(f"{where}{error.strerror or error}", 1)
+        return _fail(f"{where}{error.strerror or error}{_REMEDIES.get(error.errno or 0, '')}", 1)
+    except MemoryError:
+        return _fail("not enough memory; give --duration, or a machine with more", 1)
     except Exception as error:
         return _unexpected(error)
     if result == INTERRUPTED:  # some versions of typer turn the interrupt into its exit code
@@ -107,8 +122,24 @@ def run_command(arguments: list[str]) -> int:
     return result if isinstance(result, int) else 0
 
 
+def _require_plain(arguments: list[str]) -> None:
+    """Refuse names that neither a report nor a terminal can show, before any work.
+
+    Raises
+    ------
+    UsageError
+    """
+    for argument in arguments:
+        if any(unicodedata.category(character) in {"Cc", "Cs"} for character in argument):
+            msg = (
+                f"{printable(argument)}: holds a control character or bytes that are no UTF-8; rename "
+                "the file or folder"
+            )
+            raise UsageError(msg)
+
+
 def _fail(message: str, code: int) -> int:
-    print(f"bentwing: error: {message}", file=sys.stderr)
+    print("bentwing: error:", printable(message, keep="\n"), file=sys.stderr)
     return code
 
 

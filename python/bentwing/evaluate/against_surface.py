@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +13,7 @@ from bentwing.base.voxels import VoxelSet, voxel_keys
 from bentwing.evaluate.alignment import Alignment
 from bentwing.evaluate.clouds import Cloud
 from bentwing.evaluate.map import surface_error
-from bentwing.evaluate.placement import place
+from bentwing.evaluate.placement import coverage_of, place
 from bentwing.evaluate.spacing import PointSpacing, point_spacing
 from bentwing.evaluate.statistics import SAMPLES
 from bentwing.evaluate.surface import Surface
@@ -45,12 +45,14 @@ class Reference:
     origin : (3,) m
     spacing : of its points; None for a mesh
     is_mesh : whether it is a mesh
+    coverage : share of its points that is on its surfels
     """
 
     surfels: Surfels
     origin: NDArray[np.float64]
     spacing: PointSpacing | None
     is_mesh: bool
+    coverage: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,6 +117,9 @@ def read_reference(path: Path) -> Reference:
         edge = float(np.clip(apart, *_EDGES))
         surfels = surfels_of_cloud(cloud.parts(), edge)
         found = Reference(surfels, cloud.origin, spacing, is_mesh=False)
+        if len(surfels):
+            coverage = coverage_of(cloud.sample.points, Surface(surfels))
+            found = replace(found, coverage=coverage)
     if len(found.surfels) < _FEWEST_SURFELS:
         msg = (
             f"{path}: has {len(found.surfels)} flat pieces of {found.surfels.edge:.2f} m, "
@@ -148,7 +153,7 @@ def compare_with_map(
     """
     surface = Surface(reference.surfels)
     near = [_between_origins(start, cloud.origin, reference.origin) for start in starts]
-    placement = place(cloud.sample.points, surface, near)
+    placement = place(cloud.sample.points, surface, near, reference.coverage)
     R, t = placement.R, placement.t
     viewpoints = _viewpoints(path, cloud, reference, placement)
     surface = surface.facing(viewpoints)

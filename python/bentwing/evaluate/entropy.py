@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial import cKDTree
 
+from bentwing.base.search_tree import within
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -50,9 +52,10 @@ def map_entropy(points: NDArray[np.float64], radius: float = RADIUS) -> MapEntro
     rng = np.random.default_rng(0)
     asked = points if len(points) <= _ASKED else points[rng.choice(len(points), _ASKED, False)]  # noqa: FBT003 - without replacement
     entropies = []
-    for around in cKDTree(points).query_ball_point(asked, radius, return_sorted=True, workers=-1):
-        if len(around) < _FEWEST:
+    for found in within(cKDTree(points), asked, radius):
+        if len(found) < _FEWEST:
             continue
+        around = np.array(found)
         if len(around) > _MOST_NEIGHBOURS:
             around = rng.choice(around, _MOST_NEIGHBOURS, replace=False)
         values = np.linalg.eigvalsh(np.cov(points[around].T, bias=True))

@@ -34,7 +34,10 @@ _FEWEST = 50  # matches
 
 
 def place(
-    points: NDArray[np.float64], surface: Surface, starts: Sequence[Alignment] = ()
+    points: NDArray[np.float64],
+    surface: Surface,
+    starts: Sequence[Alignment] = (),
+    coverage: float = 1.0,
 ) -> Alignment:
     """Find the rigid motion from a map to its reference.
 
@@ -43,6 +46,7 @@ def place(
     points : (N, 3) m, an even sample of the map
     surface : the reference
     starts : placements to try besides those that the views from above suggest
+    coverage : share of what the reference has seen that is on one of its discs
 
     Raises
     ------
@@ -64,10 +68,12 @@ def place(
     many = _drawn(_thinned(points, 2 * surface.surfels.edge), _FINE_POINTS)
     found = refine(many, surface, best, _FINE_LIMITS)
     share = share_near(few, surface, found)
-    if share < _LEAST_NEAR:
+    least = _LEAST_NEAR * coverage
+    if share < least:
         msg = (
-            f"only {share:.0%} of the map come within {_NEAR:g} m of the reference map wherever it is "
-            f"put, {_LEAST_NEAR:.0%} are needed; are both of the same place, in metres, with z up?"
+            f"only {share:.1%} of the map come within {_NEAR:g} m of a surface of the reference map "
+            f"wherever it is put, {least:.1%} are needed; are both of the same place, in metres, with z "
+            "up?"
         )
         raise InputError(msg)
     return found
@@ -92,6 +98,15 @@ def refine(
             if np.abs(step).max() < _CONVERGED:
                 break
     return Alignment(R, t)
+
+
+def coverage_of(points: NDArray[np.float64], surface: Surface) -> float:
+    """Share of the points of a cloud that lie on the discs that were fitted to it.
+
+    Leaves, and walls that few beams have hit, make no disc; a map of the same place has them too.
+    """
+    few = _drawn(_thinned(points, _THINNED), _COARSE_POINTS)
+    return share_near(few, surface, Alignment(np.eye(3), np.zeros(3)))
 
 
 def share_near(points: NDArray[np.float64], surface: Surface, placement: Alignment) -> float:

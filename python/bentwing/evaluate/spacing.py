@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial import cKDTree
 
+from bentwing.base.search_tree import nearest
 from bentwing.base.voxels import column_keys
 from bentwing.evaluate.statistics import SAMPLES
 
@@ -56,7 +57,7 @@ def point_spacing(cloud: Cloud) -> PointSpacing | None:
     if len(points) < 2:
         return None
     asked = points if is_whole else points[_inner(points)]
-    distances, _ = cKDTree(points).query(asked, k=2, workers=-1)
+    distances, _ = nearest(cKDTree(points), asked, [1, 2])
     found = distances[:, 1]
     if not len(found):
         return None

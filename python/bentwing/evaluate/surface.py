@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial import cKDTree
 
+from bentwing.base.search_tree import nearest
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -40,8 +42,8 @@ class Surface:
 
     def facing(self, viewpoints: NDArray[np.float64]) -> Surface:
         """Return the same with all normals turned to the nearest of viewpoints `(M, 3)`."""
-        _, nearest = cKDTree(viewpoints).query(self.surfels.centres, workers=-1)
-        toward = viewpoints[nearest] - self.surfels.centres
+        _, closest = nearest(cKDTree(viewpoints), self.surfels.centres, [1])
+        toward = viewpoints[closest[:, 0]] - self.surfels.centres
         away = np.einsum("ni,ni->n", toward, self.surfels.normals) < 0
         normals = np.where(away[:, None], -self.surfels.normals, self.surfels.normals)
         return Surface(replace(self.surfels, normals=normals), self._tree)
@@ -68,9 +70,7 @@ class Surface:
     def within(self, points: NDArray[np.float64], distance: float) -> NDArray[np.intp]:
         """Return the indices of the discs whose centre is within a distance of any of the points."""
         count = min(_NEIGHBOURS, len(self.surfels))
-        _, found = self._tree.query(
-            points, k=[*range(1, count + 1)], distance_upper_bound=distance, workers=-1
-        )
+        _, found = nearest(self._tree, points, range(1, count + 1), distance)
         return np.unique(found[found < len(self.surfels)])
 
     def _distances(
@@ -80,9 +80,7 @@ class Surface:
         is_rough = limit > _ROUGH * surfels.edge
         count = 1 if is_rough else min(_NEIGHBOURS, len(surfels))
         reach = float(np.hypot(limit, surfels.radius + _BESIDE * surfels.edge))
-        lengths, found = self._tree.query(
-            points, k=[*range(1, count + 1)], distance_upper_bound=reach, workers=-1
-        )
+        lengths, found = nearest(self._tree, points, range(1, count + 1), reach)
         exists = np.isfinite(lengths)
         discs = np.where(exists, found, 0)
         across = np.einsum(

@@ -17,7 +17,7 @@ from bentwing.evaluate.track_columns import named_columns
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-_LAYOUT = "t x y z` or `t x y z qx qy qz qw` with t in seconds"
+_LAYOUT = "t x y z` or `t x y z qx qy qz qw"
 _POSITIONS, _POSES = 4, 8  # columns
 _FEWEST = 3
 _GAP = 5.0  # median intervals; a longer silence is not interpolated over

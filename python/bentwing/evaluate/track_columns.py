@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 
 from bentwing.base.clock import NS_PER_S
 from bentwing.base.errors import InputError
-from bentwing.base.tum import require_file
+from bentwing.base.regular_file import require_regular
+from bentwing.base.tum import MOST_BYTES
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -71,7 +72,7 @@ def _plain(name: str) -> str:
 
 
 def _first_line(path: Path) -> str:
-    require_file(path)
+    require_regular(path, MOST_BYTES)
     try:
         with path.open(encoding="utf-8") as file:
             return file.readline(_LONGEST).strip()

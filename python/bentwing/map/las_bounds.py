@@ -6,14 +6,19 @@ from __future__ import annotations
 import struct
 from typing import TYPE_CHECKING, BinaryIO
 
+import lazrs  # type: ignore[import-untyped]
+
 from bentwing.base.errors import InputError
+from bentwing.map.laz_chunks import problem_of_chunks
 
 if TYPE_CHECKING:
     from pathlib import Path
 
 _HEADER = 375  # bytes of the longest header, of version 1.4
 _SHORTEST = 227  # of the shortest one
+_LASZIP = 22204  # number of the record of the compression
 _VLR, _EVLR = 54, 60  # bytes of their headers
+_MOST_RECORDS = 10_000  # files have some dozen; each becomes an object
 _IS_COMPRESSED = 0x80  # of the point format
 
 
@@ -38,32 +43,31 @@ def require_sound_las(path: Path) -> None:
         is_new = head[24:26] >= b"\1\4"
         if is_new:
             n_points = n_more
-            _require(path, not n_evlrs or evlrs + n_evlrs * _EVLR <= size, "extended records")
+            fits = n_evlrs <= _MOST_RECORDS and evlrs + n_evlrs * _EVLR <= size
+            _require(path, not n_evlrs or fits, "extended records")
         _require(path, _SHORTEST <= header_size <= start <= size, "a header")
-        _require(path, n_records * _VLR <= start - header_size, "records")
+        fits = n_records <= _MOST_RECORDS and n_records * _VLR <= start - header_size
+        _require(path, fits, "records")
         if not point_format & _IS_COMPRESSED:
             _require(path, start + n_points * record_length <= size, "points")
         elif n_points:
-            _require_chunks(path, file, (start, size), n_points)
+            file.seek(header_size)
+            vlr = _compression(path, file, n_records)
+            _require(path, vlr.item_size() == record_length, "points of another size")
+            wrong = problem_of_chunks(file, vlr, (start, size), n_points)
+            _require(path, wrong is None, wrong or "")
 
 
-def _require_chunks(path: Path, file: BinaryIO, span: tuple[int, int], n_points: int) -> None:
-    """Check the table of compressed chunks, which the first eight bytes of the points lead to."""
-    start, size = span
-    table = _int64(file, start)
-    if table == -1:  # written as a stream: it stands at the end
-        table = _int64(file, size - 8)
-    _require(path, start + 8 <= table <= size - 8, "a table of chunks")
-    file.seek(table)
-    version, n_chunks = struct.unpack("<II", file.read(8))
-    # A chunk holds a point at least, and takes a byte at least.
-    _require(path, version == 0 and n_chunks <= min(n_points, table - start), "a table of chunks")
-
-
-def _int64(file: BinaryIO, at: int) -> int:
-    file.seek(at)
-    (value,) = struct.unpack("<q", file.read(8).ljust(8, b"\0"))
-    return int(value)
+def _compression(path: Path, file: BinaryIO, n_records: int) -> lazrs.LazVlr:
+    """Return the record that says how the points are compressed; the records follow the header."""
+    for _ in range(n_records):
+        head = file.read(_VLR).ljust(_VLR, b"\0")
+        number, size = struct.unpack_from("<HH", head, 18)
+        content = file.read(size)
+        if head[2:18].rstrip(b"\0") == b"laszip encoded" and number == _LASZIP:
+            return lazrs.LazVlr(content)
+    msg = f"{path}: has no record that says how its points are compressed; it is damaged"
+    raise InputError(msg)
 
 
 def _require(path: Path, is_sound: bool, what: str) -> None:  # noqa: FBT001 - reads as a sentence

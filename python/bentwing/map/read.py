@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bentwing.base.errors import BentwingError, InputError
+from bentwing.base.regular_file import require_regular
 from bentwing.base.value import Value
 from bentwing.map.formats import FORMATS, MAP_SUFFIXES, load
 
@@ -17,6 +18,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
     from numpy.typing import NDArray
+
+
+_LONGEST = 200  # characters of what a library says
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,6 +68,7 @@ def read_parts(
     if not path.exists():
         msg = f"{path}: no such file or folder"
         raise InputError(msg)
+    require_regular(path)
     suffix = path.suffix.lower()
     reader = next((f.reader for name, f in FORMATS.items() if suffix == f".{name}"), None)
     if reader is None:
@@ -77,7 +82,7 @@ def read_parts(
     except Exception as error:
         # Parsers of foreign files fail in every way there is; the file is what the user can change.
         # Some libraries go on for lines about where in their sources they were.
-        what = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
+        what = (str(error).strip() or type(error).__name__).splitlines()[0][:_LONGEST]
         msg = f"{path}: not readable as {suffix[1:].upper()} ({what})"
         raise InputError(msg) from error
 

@@ -3,12 +3,14 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 
 from bentwing.base.errors import InputError
+from bentwing.base.regular_file import require_regular
 from bentwing.map.read_rows import PLY_TYPES, header_lines
 
 if TYPE_CHECKING:
@@ -35,6 +37,7 @@ def read_mesh(path: Path) -> Mesh | None:
     """
     if path.suffix.lower() != ".ply":
         return None
+    require_regular(path)
     try:
         with path.open("rb") as file:
             lines = header_lines(path, file, "end_header")
@@ -84,7 +87,8 @@ def _tables(
 
 
 def _rows(file: BinaryIO, dtype: np.dtype[Any], count: int) -> NDArray[Any]:
-    data = file.read(dtype.itemsize * count)
+    left = os.fstat(file.fileno()).st_size - file.tell()
+    data = file.read(min(left, dtype.itemsize * count))
     if len(data) < dtype.itemsize * count:
         msg = f"{count} rows are announced, {len(data) // dtype.itemsize} are there"
         raise ValueError(msg)

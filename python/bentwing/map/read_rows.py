@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from itertools import islice
+import mmap
+import tempfile
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
@@ -19,7 +20,8 @@ if TYPE_CHECKING:
 
     Table = tuple[NDArray[np.float64], NDArray[np.float64] | None]
 
-PART = 1_000_000  # points that are read at once
+PART = 1_000_000  # points that are read at once, at most
+PART_BYTES = 2**26  # and no more than this of the file
 PLY_TYPES = {
     "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",
     "float": "f4", "double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2",
@@ -29,6 +31,8 @@ PCD_OFFSET = "# add to x y z:"
 _TIME = "time"  # the column our own files have
 _MAX_HEADER_LINES = 1000
 _MOST_COLUMNS = 10_000
+_WIDEST = 2**20  # bytes of a point
+_LONGEST_LINE = 2**20  # bytes
 _MOST_EXPANDED = 100  # bytes that LZF makes of one
 
 
@@ -95,7 +99,7 @@ def pcd_rows(path: Path) -> Iterator[Table]:
             for points, times in _binary_rows(path, file, np.dtype(fields), count):
                 yield points + offset, times
         else:
-            yield _compressed_columns(path, file, np.dtype(fields), count)
+            yield from _compressed_columns(path, file, np.dtype(fields), count)
 
 
 def _pcd_offset(file: BinaryIO) -> NDArray[np.float64]:
@@ -108,8 +112,13 @@ def _pcd_offset(file: BinaryIO) -> NDArray[np.float64]:
     return np.array(found[0].split(), np.float64) if found else np.zeros(3)
 
 
-def _compressed_columns(path: Path, file: BinaryIO, dtype: np.dtype[Any], count: int) -> Table:
-    """Decompress all points at once, as they were compressed: column after column."""
+def _compressed_columns(
+    path: Path, file: BinaryIO, dtype: np.dtype[Any], count: int
+) -> Iterator[Table]:
+    """Read points that were compressed at once, column after column.
+
+    Decompressed they are many times the file, so they go to the disk.
+    """
     sizes = file.read(8)
     if len(sizes) < 8:
         _refuse_truncated(path, count, 0)
@@ -117,19 +126,38 @@ def _compressed_columns(path: Path, file: BinaryIO, dtype: np.dtype[Any], count:
     if size != count * dtype.itemsize:
         msg = f"{path}: announces {count} points of {dtype.itemsize} bytes, holds {size} bytes"
         raise InputError(msg)
-    packed = file.read(compressed)
-    if len(packed) < compressed or size > _MOST_EXPANDED * compressed:
+    begin, end = file.tell(), path.stat().st_size
+    if begin + compressed > end or size > _MOST_EXPANDED * compressed:
         _refuse_truncated(path, count, 0)
-    data = decompress_lzf(packed, size)
-    columns: dict[str, NDArray[np.float64]] = {}
-    at = 0
+    if not count:
+        return
+    with (
+        mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as mapped,
+        memoryview(mapped) as whole,
+        whole[begin : begin + compressed] as packed,
+        tempfile.TemporaryFile() as unpacked,
+    ):
+        for block in decompress_lzf(packed, size):
+            unpacked.write(block)
+        yield from _columns(unpacked, dtype, count)
+
+
+def _columns(file: BinaryIO, dtype: np.dtype[Any], count: int) -> Iterator[Table]:
+    """Read the columns of points part by part."""
+    starts, at = {}, 0
     for name in dtype.names or ():
-        width = count * dtype[name].itemsize
-        if name in {"x", "y", "z", _TIME}:
-            column = np.frombuffer(data[at : at + width], dtype[name].base)
-            columns[name] = column.astype(np.float64)
-        at += width
-    return np.stack([columns[name] for name in "xyz"], axis=1), columns.get(_TIME)
+        starts[name] = at
+        at += count * dtype[name].itemsize
+
+    def column(name: str, first: int, n: int) -> NDArray[np.float64]:
+        kind = dtype[name].base
+        file.seek(starts[name] + first * kind.itemsize)
+        return np.frombuffer(file.read(n * kind.itemsize), kind).astype(np.float64)
+
+    for first in range(0, count, PART):
+        n = min(PART, count - first)
+        points = np.stack([column(axis, first, n) for axis in "xyz"], axis=1)
+        yield points, column(_TIME, first, n) if _TIME in starts else None
 
 
 def header_lines(path: Path, file: BinaryIO, last: str) -> list[list[str]]:
@@ -149,10 +177,14 @@ def header_lines(path: Path, file: BinaryIO, last: str) -> list[list[str]]:
 
 
 def _binary_rows(path: Path, file: BinaryIO, dtype: np.dtype[Any], count: int) -> Iterator[Table]:
+    if dtype.itemsize > _WIDEST:
+        msg = f"{path}: announces points of {dtype.itemsize} bytes; it is damaged"
+        raise InputError(msg)
+    most = min(PART, max(1, PART_BYTES // max(1, dtype.itemsize)))
     n = 0
     has_times = _TIME in (dtype.names or ())
     while n < count:
-        data = file.read(dtype.itemsize * min(PART, count - n))
+        data = file.read(dtype.itemsize * min(most, count - n))
         table = np.frombuffer(data, dtype, len(data) // dtype.itemsize)
         if not len(table):
             _refuse_truncated(path, count, n)
@@ -166,12 +198,25 @@ def _ascii_rows(path: Path, file: BinaryIO, names: list[str], count: int) -> Ite
     columns = [names.index(name) for name in ("x", "y", "z", _TIME)[: 3 + (_TIME in names)]]
     n = 0
     while n < count:
-        lines = list(islice(file, min(PART, count - n)))
+        lines = _lines(path, file, min(PART, count - n))
         rows = np.loadtxt(lines, usecols=columns, ndmin=2) if lines else np.empty((0, 3))
         if not len(rows):
             _refuse_truncated(path, count, n)
         n += len(rows)
         yield np.ascontiguousarray(rows[:, :3]), rows[:, 3].copy() if _TIME in names else None
+
+
+def _lines(path: Path, file: BinaryIO, most: int) -> list[bytes]:
+    """Return the next lines, as many as may be in memory."""
+    lines: list[bytes] = []
+    left = PART_BYTES
+    while len(lines) < most and left > 0 and (line := file.readline(_LONGEST_LINE)):
+        if len(line) == _LONGEST_LINE:
+            msg = f"{path}: has a line of more than {_LONGEST_LINE} bytes; it is damaged"
+            raise InputError(msg)
+        lines.append(line)
+        left -= len(line)
+    return lines
 
 
 def _refuse_truncated(path: Path, count: int, found: int) -> None:

@@ -3,12 +3,13 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import fields
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing.base.atomic import temporary_name
+from bentwing.base.atomic import temporary_name, writing
 from bentwing.map.chunk import MapChunk
 
 if TYPE_CHECKING:
@@ -42,21 +43,27 @@ class ChunkSpool:
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        self._file.close()
-        self._path.unlink(missing_ok=True)
+        try:
+            # Nobody reads on: what could not be written need not be.
+            with suppress(OSError):
+                self._file.close()
+        finally:
+            self._path.unlink(missing_ok=True)
 
     def add(self, chunk: MapChunk) -> None:
         """Append a chunk."""
         values = {field.name: getattr(chunk, field.name) for field in fields(chunk)}
         present = {name: value for name, value in values.items() if value is not None}
-        np.save(self._file, np.array(list(present)))
-        for value in present.values():
-            np.save(self._file, value)
+        with writing(self._path):
+            np.save(self._file, np.array(list(present)))
+            for value in present.values():
+                np.save(self._file, value)
 
     def chunks(self) -> Iterator[MapChunk]:
         """Yield the chunks in the order in which they came."""
-        end = self._file.tell()
-        self._file.seek(0)
+        with writing(self._path):
+            end = self._file.tell()
+            self._file.seek(0)
         while self._file.tell() < end:
             names = np.load(self._file).tolist()
             yield MapChunk(**{name: np.load(self._file) for name in names})

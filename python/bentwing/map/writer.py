@@ -4,11 +4,12 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from contextlib import nullcontext, suppress
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from bentwing.base.atomic import publish, temporary_name
+from bentwing.base.atomic import publish, temporary_name, writing
 from bentwing.map.chunk import MapChunk
 from bentwing.map.formats import FORMATS, load, require_format
 
@@ -48,10 +49,11 @@ class MapWriter(ABC):
 
     def write(self, chunk: MapChunk) -> None:
         """Append the points of a chunk."""
-        if not self._open:
-            self._begin(chunk)
-            self._open = True
-        self._append(chunk)
+        with writing(self.path):
+            if not self._open:
+                self._begin(chunk)
+                self._open = True
+            self._append(chunk)
         self.n_points += len(chunk)
 
     def __exit__(
@@ -64,12 +66,18 @@ class MapWriter(ABC):
             if kind is None:
                 if not self._open:
                     self.write(_EMPTY)
-                self._finish()
-                publish(self._temporary, self.path)
+                with writing(self.path):
+                    self._finish()
+                    publish(self._temporary, self.path)
             elif self._open:
-                self._abandon()
+                self._give_up(error)
         finally:
             self._temporary.unlink(missing_ok=True)
+
+    def _give_up(self, error: BaseException | None) -> None:
+        """Close the file; where it cannot be written, closing it fails once more."""
+        with suppress(OSError) if isinstance(error, OSError) else nullcontext():
+            self._abandon()
 
     @abstractmethod
     def _begin(self, first: MapChunk) -> None:

@@ -23,6 +23,7 @@ from bentwing.odometry.window_inputs import (
     checked_points,
     core_views,
     inertial_samples,
+    pose_interval,
     prior_samples,
 )
 from bentwing.odometry.window_result import WindowResult
@@ -86,7 +87,7 @@ def register_window(
     head, n_threads = as_payload(payload), thread_count(threads)
     chosen = _settings(settings)
     start = _calibration(calibration, head)
-    samples = prior_samples(prior)
+    samples = prior_samples(prior, chosen.registration.knot_interval)
     seen = checked_points(points, times, angles, prior, start)
     inertial, views = inertial_samples(imu), core_views(fixed_views)
     slow = core_globals(start)
@@ -116,7 +117,7 @@ def register_window(
         offset=known.offset,
         frozen=known.frozen.tolist(),
         joined=continues,
-        settings=CoreSettings.of(chosen.registration, head, _interval(prior)),
+        settings=CoreSettings.of(chosen.registration, head, pose_interval(prior)),
         threads=n_threads,
     )
     _require_matches(found, seen)
@@ -167,10 +168,6 @@ def _calibration(calibration: Calibration | None, payload: Payload) -> Calibrati
         return replace(described, latency=described.source_latency, latency_read=0.0)
     remedy = "give that of an earlier result, or leave it out"
     return instance("calibration", calibration, Calibration, remedy)
-
-
-def _interval(prior: Trajectory) -> float:
-    return float((prior.times[-1] - prior.times[0]) / (len(prior) - 1))
 
 
 def _require_matches(found: _core.Registration, seen: Points) -> None:

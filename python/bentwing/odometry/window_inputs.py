@@ -22,6 +22,10 @@ if TYPE_CHECKING:
     from bentwing.base.calibration import Calibration
 
 
+# How far a second difference of the poses may reach, in knot intervals, as the core has it.
+_REACH = 0.999
+
+
 @dataclass(frozen=True, slots=True)
 class Points:
     """Points of a window: (N, 3) m, (N,) s and rad."""
@@ -62,14 +66,28 @@ def checked_points(
     return Points(table, stamps, None)
 
 
-def prior_samples(prior: Trajectory) -> _core.Samples:
-    """Return the prior's poses, which have to be at a uniform rate."""
+def prior_samples(prior: Trajectory, knot_interval: float) -> _core.Samples:
+    """Return the prior's poses, which have to be at a uniform rate, and dense enough for the knots."""
     remedy = "make one: Trajectory(times, positions, quats_xyzw)"
     try:
-        return core_samples(instance("prior", prior, Trajectory, remedy))
+        samples = core_samples(instance("prior", prior, Trajectory, remedy))
     except ValueError as error:
         msg = f"prior: {error}"
         raise ValueError(msg) from None
+    interval = pose_interval(prior)
+    if 2 * interval >= _REACH * knot_interval:
+        msg = (
+            f"prior: a pose every {interval:.6g} s is too few for knots every {knot_interval:g} s, "
+            "between which more than two are needed; resample it, to 100 Hz for instance, with times "
+            "in seconds"
+        )
+        raise ValueError(msg)
+    return samples
+
+
+def pose_interval(prior: Trajectory) -> float:
+    """Return the time between the poses, s."""
+    return float((prior.times[-1] - prior.times[0]) / (len(prior) - 1))
 
 
 def inertial_samples(imu: ImuBatch | None) -> _core.Imu | None:

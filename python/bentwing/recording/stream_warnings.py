@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 MAX_LISTED = 3
 REASONS = {
     "broken_messages": "{n} messages could not be read and were left out; the file is damaged there",
+    "empty_scans": "{n} empty scans were left out",
     "broken_packets": "{n} packets are none of this sensor's and were left out",
     "bad_columns": "{n} columns lie outside of the turn or the time of their packet and were left out; "
     "check that the metadata are of the mode of the recording",

@@ -7,10 +7,11 @@ what the record said then are read back bit for bit, so that the results are tho
 
 from __future__ import annotations
 
+import hashlib
 import io
 import json
 from typing import TYPE_CHECKING, Any
-from zipfile import BadZipFile
+from zipfile import BadZipFile, ZipFile
 
 import numpy as np
 
@@ -18,9 +19,10 @@ from bentwing.base.atomic import write_bytes
 from bentwing.base.breaks import Break
 from bentwing.base.calibration import Calibration
 from bentwing.base.covariances import PoseCovariances
-from bentwing.base.errors import UsageError
+from bentwing.base.errors import BentwingError, UsageError
 from bentwing.base.estimate import Estimate
 from bentwing.base.plain import plain
+from bentwing.base.result_folder import is_plain_name
 from bentwing.base.trajectory import Trajectory
 from bentwing.base.window_record import WindowRecord
 from bentwing.calibrate.set_up import SetUp
@@ -29,6 +31,8 @@ from bentwing.evaluate.verdict import Evidence
 from bentwing.run.found import Found, Reading, Spin
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from bentwing.run.folder import RunFolder
     from bentwing.run.settings import RunSettings
 
@@ -40,6 +44,13 @@ _OF_ESTIMATE = ("windows", "counts", "timings", "health", "notes", "breaks", "se
 _CORRECTIONS = ("localization", "loop_closure", "merging")
 # What must be the same for a run to go on; the number of threads changes no bit.
 _FREE = frozenset({"threads"})
+STAGES = ("estimate", "loops")
+_DIGEST = hashlib.sha256().digest_size
+# What reading something that bentwing has not written ends in.
+_DAMAGE = (
+    ArithmeticError, AttributeError, BadZipFile, BentwingError, EOFError, LookupError, MemoryError,
+    NotImplementedError, RecursionError, TypeError, ValueError,
+)  # fmt: skip
 
 
 class Checkpoint:
@@ -91,7 +102,8 @@ class Checkpoint:
             spin=np.array(found.spin.samples).reshape(-1, 2),
             **arrays,
         )
-        write_bytes(self._folder.file(NAME), data.getvalue())
+        content = data.getvalue()
+        write_bytes(self._folder.file(NAME), content + hashlib.sha256(content).digest())
         self._folder.save()  # a run that is killed now is known to have this file
 
     def restore(self, *, resume: bool) -> tuple[str | None, Found]:
@@ -113,23 +125,33 @@ class Checkpoint:
         if not resume:
             return None, Found()
         try:
-            with np.load(self._path, allow_pickle=False) as stored:
-                arrays = {name: stored[name] for name in stored.files}
-                described = json.loads(str(stored["described"]))
+            arrays, described = _read(self._path)
         except FileNotFoundError:
             return None, Found()
-        except (OSError, ValueError, KeyError, BadZipFile) as error:
-            note = f"{self._path}: cannot be read ({error}); the run begins anew"
-            return None, Found(stage_warnings=(note,))
-        self._require_same(described["asked"])
-        if not all((self._folder.path / name).exists() for name in described["files"]):
-            return None, Found()
-        for name in (*described["files"], NAME):
+        except (OSError, *_DAMAGE) as error:
+            return None, self._anew(error)
+        self._require_same(described.get("asked"))
+        try:
+            stage, files = str(described["stage"]), [*described["files"]]
+            if stage not in STAGES or not all(map(self._has, files)):
+                return None, Found()
+            timings = {name: float(value) for name, value in described["timings"].items()}
+            found = _found(arrays, described)
+        except _DAMAGE as error:
+            return None, self._anew(error)
+        for name in (*files, NAME):
             self._folder.file(name)
-        for stage, seconds in described["timings"].items():
-            self._folder.record.add_seconds(stage, seconds)
-        self._folder.record.found = _found(arrays, described)
-        return str(described["stage"]), self._folder.record.found
+        for name, seconds in timings.items():
+            self._folder.record.add_seconds(name, seconds)
+        self._folder.record.found = found
+        return stage, found
+
+    def _has(self, name: object) -> bool:
+        return is_plain_name(name) and (self._folder.path / str(name)).exists()
+
+    def _anew(self, error: BaseException) -> Found:
+        note = f"{self._path}: cannot be read ({error}); the run begins anew"
+        return Found(stage_warnings=(note,))
 
     def discard(self) -> None:
         """Remove what only an unfinished run needs."""
@@ -143,8 +165,8 @@ class Checkpoint:
         asked: dict[str, Any] = plain({**settings, "inputs": self._folder.record.inputs})
         return asked
 
-    def _require_same(self, earlier: dict[str, Any]) -> None:
-        now = self._asked()
+    def _require_same(self, asked: object) -> None:
+        now, earlier = self._asked(), asked if isinstance(asked, dict) else {}
         changed = sorted(k for k in {*now, *earlier} if now.get(k) != earlier.get(k))
         if changed:
             msg = (
@@ -152,6 +174,32 @@ class Checkpoint:
                 "give the same, or leave --resume out to begin anew"
             )
             raise UsageError(msg)
+
+
+def _read(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return the arrays and the description in a checkpoint that is as it was written.
+
+    Raises
+    ------
+    OSError, or one of _DAMAGE
+    """
+    whole = path.read_bytes()
+    content, digest = whole[:-_DIGEST], whole[-_DIGEST:]
+    if hashlib.sha256(content).digest() != digest:
+        msg = "it is damaged: its SHA-256 is another"
+        raise ValueError(msg)
+    with ZipFile(io.BytesIO(content)) as packed:
+        # Written without compression: nothing in it is larger than the file.
+        if sum(entry.file_size for entry in packed.infolist()) > len(content):
+            msg = "it announces more than it holds"
+            raise ValueError(msg)
+    with np.load(io.BytesIO(content), allow_pickle=False) as stored:
+        arrays = {name: stored[name] for name in stored.files}
+    described = json.loads(str(arrays["described"]))
+    if not isinstance(described, dict):
+        msg = "it describes nothing"
+        raise TypeError(msg)
+    return arrays, described
 
 
 def _found(arrays: dict[str, Any], described: dict[str, Any]) -> Found:

@@ -8,9 +8,10 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from bentwing.base.errors import EstimationError
+from bentwing.base.errors import EstimationError, NotEnoughDataError
 from bentwing.calibrate.carrier import CarrierWatch, carrier_warnings
 from bentwing.evaluate.verdict import EarlyJudge, Watch, judge_estimate
+from bentwing.recording.losses import losses
 from bentwing.run.found import Reading, Spin
 
 if TYPE_CHECKING:
@@ -94,6 +95,8 @@ class FirstPass:
             failure = error
             if isinstance(error, (EstimationError, KeyboardInterrupt)):
                 open_loop = self._so_far(error)
+            if isinstance(error, NotEnoughDataError):
+                failure = self._with_losses(error)
         return self._with(replace(found, estimate=open_loop, doubt=doubt, failure=failure))
 
     def _take(self, batch: Batch) -> None:
@@ -116,6 +119,12 @@ class FirstPass:
         with suppress(lacking):
             return self._engine.so_far()
         return None
+
+    def _with_losses(self, error: NotEnoughDataError) -> NotEnoughDataError:
+        lost = losses(self._job.part.recording.counts + self._counts)
+        return (
+            NotEnoughDataError(f"{error}; of the recording, {', '.join(lost)}") if lost else error
+        )
 
     def _with(self, found: Found) -> Found:
         part = self._job.part

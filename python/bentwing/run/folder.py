@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import json
 import time
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -80,7 +80,9 @@ class RunFolder:
                 self._complete()
             else:
                 self.fail(error)
-                self.save()
+                # On a disk that is full, run.json goes on saying that the run is not complete.
+                with suppress(OSError) if isinstance(error, OSError) else nullcontext():
+                    self.save()
         finally:
             self._lock.release()
 

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,6 +14,7 @@ from bentwing.closing.localize import read_prior_map
 from bentwing.run import stages
 from bentwing.run.beams import read_by
 from bentwing.run.check import opened
+from bentwing.run.checkpoint import NAME as CHECKPOINT
 from bentwing.run.checkpoint import Checkpoint
 from bentwing.run.choose import as_run_settings
 from bentwing.run.estimate import estimate
@@ -191,8 +192,20 @@ def _reported(folder: RunFolder, progress: Progress) -> Iterator[None]:
     """Say the warnings at the end, and report a failure before it leaves."""
     try:
         yield
+    except OSError as error:
+        with suppress(OSError):  # a disk that is full has no room for the report either
+            report_failure(folder, error)
+        raise _with_what_is_kept(error, folder) from error
     except BaseException as error:
         report_failure(folder, error)
         raise
     finally:
         say_warnings(progress, folder.record.found.warnings)
+
+
+def _with_what_is_kept(error: OSError, folder: RunFolder) -> OSError:
+    is_kept = (folder.path / CHECKPOINT).exists()
+    kept = (
+        "what was estimated is kept, --resume goes on behind it" if is_kept else "nothing is kept"
+    )
+    return OSError(error.errno, f"{error.strerror or error}; {kept}", error.filename)

@@ -30,6 +30,11 @@ from bentwing.odometry import (
 )
 from bentwing.recording import Payload
 
+MOST_SECONDS = 1e9
+"""No recording lasts for thirty years."""
+SMALLEST_SPACING = 0.001
+"""Finer voxels than a millimetre's tell no points apart, m."""
+
 _Model = TypeVar("_Model", bound=BaseModel)
 
 
@@ -40,6 +45,7 @@ class MapSettings(Settings):
     map_spacing: Metres = Field(
         default=0.0,
         ge=0,
+        le=1000,
         description="edge of the voxels that keep one point each; 0 keeps all points",
     )
     cleaning: CleanSettings = Field(default=CleanSettings(), description="what the map leaves out")
@@ -54,6 +60,14 @@ class MapSettings(Settings):
     @classmethod
     def _can_be_written(cls, name: str) -> str:
         return require_format(name)
+
+    @field_validator("map_spacing")
+    @classmethod
+    def _is_none_or_a_length(cls, spacing: float) -> float:
+        if 0 < spacing < SMALLEST_SPACING:
+            msg = f"give 0 for all points, or {SMALLEST_SPACING:g} m and more, not {spacing:g} m"
+            raise ValueError(msg)
+        return spacing
 
     def to_json(self) -> dict[str, Any]:
         """Return the settings in plain JSON types, as run.json has them."""
@@ -89,10 +103,16 @@ class RunSettings(MapSettings):
         default=None, description="map in which the recording is localized"
     )
     start: Annotated[float | None, Unit("s")] = Field(
-        default=None, ge=0, description="time to skip at the start of the recording"
+        default=None,
+        ge=0,
+        le=MOST_SECONDS,
+        description="time to skip at the start of the recording",
     )
     duration: Annotated[float | None, Unit("s")] = Field(
-        default=None, ge=0, description="length of the part to use; default: all of the recording"
+        default=None,
+        ge=0,
+        le=MOST_SECONDS,
+        description="length of the part to use; default: all of the recording",
     )
     force: bool = Field(
         default=False,

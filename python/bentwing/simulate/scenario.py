@@ -63,12 +63,12 @@ class Scenario(Settings):
     scene: SceneName
     head: HeadName = "hokuyo-spin"
     duration: float = Field(default=60.0, gt=0.0, le=3600.0)
-    seed: int = Field(default=0, ge=0)
-    flight_seed: int | None = Field(default=None, ge=0)
+    seed: int = Field(default=0, ge=0, le=2**63 - 1)
+    flight_seed: int | None = Field(default=None, ge=0, le=2**63 - 1)
     format: RecordingFormat = "bag"
     motor_rate: float = Field(default=1.0, gt=0.0, le=10.0)
     spin: SpinName = "steady"
-    max_range: float | None = Field(default=None, gt=1.0)
+    max_range: float | None = Field(default=None, gt=1.0, le=10_000.0)
     speed: float | None = Field(default=None, gt=0.1, le=20.0)
     events: tuple[EventName, ...] = ()
     stall: float = Field(default=STALL, gt=0.0, le=60.0)

@@ -132,13 +132,27 @@ def test_a_mesh_with_a_changed_byte_is_read_or_an_input_error(tmp_path, at, byte
 def test_repetitions_of_compressed_data_may_overlap_themselves():
     # three bytes as they are, then nine from two back: abc + bcbcbcbcb
     packed = bytes([2]) + b"abc" + bytes([7 << 5, 0, 1])
-    assert decompress_lzf(packed, 12) == b"abcbcbcbcbcb"
+    assert b"".join(decompress_lzf(packed, 12)) == b"abcbcbcbcbcb"
+
+
+def test_repetitions_reach_back_over_the_ends_of_blocks():
+    rng = np.random.default_rng(3)
+    packed, expected = bytearray(), bytearray()
+    while len(expected) < 3_000_000:
+        literal = rng.bytes(int(rng.integers(1, 33)))
+        packed += bytes([len(literal) - 1]) + literal
+        expected += literal
+        back, length = int(rng.integers(1, min(len(expected), 8192) + 1)), int(rng.integers(9, 265))
+        packed += bytes([(7 << 5) | ((back - 1) >> 8), length - 9, (back - 1) & 255])
+        for _ in range(length):
+            expected.append(expected[-back])
+    assert b"".join(decompress_lzf(bytes(packed), len(expected))) == expected
 
 
 @pytest.mark.parametrize("packed", [b"\x02abc\x20\x05", b"\x02abc", b"\x02ab"])
 def test_damaged_compressed_data_are_refused(packed):
     with pytest.raises(ValueError, match="damaged"):
-        decompress_lzf(packed, 12)
+        b"".join(decompress_lzf(packed, 12))
 
 
 def test_compressed_pcd_files_are_read_and_truncated_ones_refused(tmp_path):

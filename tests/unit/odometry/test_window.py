@@ -194,6 +194,12 @@ def test_a_payload_may_be_given_by_its_file(tmp_path):
     assert register_window(points, times, truth(), payload=str(path)) == by_value
 
 
+def in_unit(per_second):
+    """The prior with times in another unit than seconds."""
+    prior = truth()
+    return Trajectory(per_second * prior.times, prior.positions, prior.quats_xyzw)
+
+
 def scattered(n=50):
     rng = np.random.default_rng(0)
     return rng.uniform(-5, 5, (n, 3)), np.sort(rng.uniform(0, DURATION, n))
@@ -237,6 +243,10 @@ MOTOR = Payload.model_validate({"encoder": {}})
         ({"prior": np.eye(4)}, TypeError, r"prior: expected a Trajectory, got ndarray; make one"),
         ({"prior": truth()[:1]}, ValueError, "prior: .* at least two poses"),
         ({"prior": truth()[np.arange(310) % 7 > 0]}, ValueError, "prior: .* resample it"),
+        ({"prior": truth()[::10]}, ValueError, r"prior: a pose every 0.1 s .* resample it"),
+        ({"prior": truth()[::50]}, ValueError, r"prior: a pose every 0.5 s .* resample it"),
+        ({"prior": in_unit(1e6), "times": np.linspace(5e5, 9e5, 5)}, ValueError, "in seconds"),
+        ({"prior": in_unit(1e9), "times": np.linspace(5e8, 9e8, 5)}, ValueError, "in seconds"),
         ({"angles": np.zeros(4)}, ValueError, r"angles: expected shape \(5,\), got \(4,\)"),
         ({"payload": MOTOR}, ValueError, "angles: expected the motor's angle at each of the 5"),
         ({"imu": (1, 2, 3)}, TypeError, "imu: expected an ImuBatch, got tuple; make one"),

@@ -52,6 +52,9 @@ impl GlobalPosterior {
             knot_interval,
             ..settings.clone()
         };
+        for state in states {
+            settings.require_dense(&state.trajectory)?;
+        }
         let states = states.iter().map(|s| s.with_knots(knot_interval));
         let mut states: Vec<State<'_>> = states.collect();
         let joint = Joint::new(&states);

@@ -7,6 +7,17 @@ use thiserror::Error;
 #[derive(Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum SolveError {
+    /// Finite differences of the samples would reach over more knots than a row has.
+    #[error(
+        "poses every {dt} s are too sparse for knots every {knot_interval} s: expected more than two \
+         poses per knot"
+    )]
+    Sparse {
+        /// Interval of the poses, s.
+        dt: f64,
+        /// Interval of the knots, s.
+        knot_interval: f64,
+    },
     /// An unknown that nothing constrains.
     #[error("the normal equations are singular at {unknown}")]
     Singular {

@@ -5,12 +5,14 @@ from __future__ import annotations
 
 import csv
 import re
+from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bentwing.base.errors import InputError
+from bentwing.base.regular_file import require_regular
 from bentwing.closing.georeference.control_points import ControlPoint
 
 if TYPE_CHECKING:
@@ -30,6 +32,7 @@ _NAMES = {
     "use": ("use", "type"),
     "map_x": ("map_x",), "map_y": ("map_y",), "map_z": ("map_z",),
 }  # fmt: skip
+_MOST_BYTES = 2**24  # a site has some hundred marks
 _DELIMITERS = ";\t,"
 _PLACES = {"degrees": ("longitude", "latitude", "z"), "metres": ("x", "y", "z")}
 _PICKED = ("map_x", "map_y", "map_z")
@@ -65,9 +68,19 @@ def read_control_points(path: Path) -> ControlPoints:
     InputError
         If a column is missing, a value is no number, a radius is not positive, or a name is twice.
     """
+    require_regular(path, _MOST_BYTES)
     lines = _lines(path)
     delimiter = max(_DELIMITERS, key=lines[0].count) if lines else ","
-    reader = csv.DictReader(lines, delimiter=delimiter, skipinitialspace=True)
+    try:
+        return _control_points(
+            path, csv.DictReader(lines, delimiter=delimiter, skipinitialspace=True), delimiter
+        )
+    except csv.Error as error:
+        msg = f"{path}: not readable as control points ({error})"
+        raise InputError(msg) from error
+
+
+def _control_points(path: Path, reader: csv.DictReader[str], delimiter: str) -> ControlPoints:
     columns = _columns(reader.fieldnames or [])
     places = _PLACES["degrees" if "longitude" in columns else "metres"]
     missing = [name for name in ("id", *places) if name not in columns]
@@ -138,8 +151,8 @@ def _control_point(
 
 
 def _require_names(path: Path, names: Sequence[str]) -> None:
-    twice = sorted({name for name in names if names.count(name) > 1})
+    twice = sorted(name for name, n in Counter(names).items() if n > 1)
     if twice or not names:
-        what = f"names {', '.join(twice)} twice" if twice else "holds no point"
+        what = f"names {', '.join(twice[:3])} twice" if twice else "holds no point"
         msg = f"{path}: {what}; give every mark one line"
         raise InputError(msg)

@@ -25,6 +25,7 @@ class GeoreferenceSettings(Settings):
     epsg: int | None = Field(
         default=None,
         gt=0,
+        le=2**31 - 1,
         description="projected system of the map; default: the UTM zone of the fixes",
     )
     control_points: Path | None = Field(

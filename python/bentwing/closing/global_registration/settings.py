@@ -17,18 +17,28 @@ class GlobalSettings(Settings):
 
     knot_interval: Seconds = Field(
         default=1.0,
-        gt=0,
+        ge=0.05,
+        le=600,
         description="time between knots of the correction spline; the windows have settled what is "
         "faster",
     )
     max_knots: int = Field(
-        default=1000, ge=4, description="most knots in all; long recordings get a longer interval"
+        default=1000,
+        ge=4,
+        le=100_000,
+        description="most knots in all; long recordings get a longer interval",
     )
     stretch: Seconds = Field(
-        default=5.0, gt=0, description="length of the data that is matched as one visit of a place"
+        default=5.0,
+        ge=0.1,
+        le=600,
+        description="length of the data that is matched as one visit of a place",
     )
     n_visits: int = Field(
-        default=8, ge=0, description="number of other visits that each stretch is matched with"
+        default=8,
+        ge=0,
+        le=1000,
+        description="number of other visits that each stretch is matched with",
     )
     min_overlap: float = Field(
         default=0.15,
@@ -39,16 +49,17 @@ class GlobalSettings(Settings):
     max_match_distance: float = Field(
         default=0.6, gt=0, le=1, description="largest distance of a match in feature space"
     )
-    max_outer: int = Field(default=8, ge=1, description="most outer iterations")
+    max_outer: int = Field(default=8, ge=1, le=1000, description="most outer iterations")
     min_translation: Metres = Field(
-        default=1e-3, gt=0, description="smaller steps of the position end the iterations"
+        default=1e-3, gt=0, le=10, description="smaller steps of the position end the iterations"
     )
     min_rotation: Radians = Field(
-        default=1e-4, gt=0, description="smaller steps of the rotation end the iterations"
+        default=1e-4, gt=0, le=1, description="smaller steps of the rotation end the iterations"
     )
     memory_mb: Annotated[float, Unit("MB")] = Field(
         default=2000.0,
-        gt=0,
+        ge=10,
+        le=1e6,
         description="memory of surfels and equations; surfels are thinned to fit",
     )
     surfels: SurfelSettings = Field(default=SurfelSettings(), description="what makes a surfel")

@@ -14,47 +14,60 @@ class PlaceSettings(Settings):
 
     duration: Seconds = Field(
         default=10.0,
-        gt=0,
+        ge=0.1,
+        le=3600,
         description="duration of a place, short enough for the drift within it to be small",
     )
     tile: Metres = Field(
         default=30.0,
-        gt=0,
+        ge=0.1,
+        le=1e6,
         description="edge of the tiles of clouds without times, and the farthest that a carrier goes "
         "within a place",
     )
     max_points: int = Field(
-        default=200_000, ge=1, description="most points of a place; of more, every n-th is taken"
+        default=200_000,
+        ge=1,
+        le=100_000_000,
+        description="most points of a place; of more, every n-th is taken",
     )
-    voxel: Metres = Field(default=0.3, gt=0, description="voxel of the averaged cloud")
+    voxel: Metres = Field(default=0.3, ge=0.01, le=100, description="voxel of the averaged cloud")
     surfel: Metres = Field(
-        default=0.5, gt=0, description="voxel of the surfels that verify matches"
+        default=0.5, ge=0.01, le=100, description="voxel of the surfels that verify matches"
     )
-    n_keypoints: int = Field(default=400, ge=1, description="number of keypoints of a place")
+    n_keypoints: int = Field(
+        default=400, ge=1, le=100_000, description="number of keypoints of a place"
+    )
 
 
 class MatchSettings(Settings):
     """What it takes to believe that two places overlap."""
 
     n_neighbours: int = Field(
-        default=5, ge=1, description="number of a descriptor's neighbours that vote"
+        default=5, ge=1, le=1000, description="number of a descriptor's neighbours that vote"
     )
     min_votes: float = Field(
-        default=8.0, ge=0, description="least votes that make two places a candidate"
+        default=8.0, ge=0, le=1e6, description="least votes that make two places a candidate"
     )
     max_candidates: int = Field(
-        default=8, ge=1, description="most candidates of a place, those with the most votes"
+        default=8,
+        ge=1,
+        le=1000,
+        description="most candidates of a place, those with the most votes",
     )
     n_hypotheses: int = Field(
         default=40,
         ge=1,
+        le=10_000,
         description="number of transforms per candidate that are checked quickly, those on which most "
         "matches agree",
     )
     n_refined: int = Field(
-        default=6, ge=1, description="number of these that are refined, the best ones"
+        default=6, ge=1, le=1000, description="number of these that are refined, the best ones"
     )
-    min_inliers: int = Field(default=4, ge=1, description="least number of keypoints that agree")
+    min_inliers: int = Field(
+        default=4, ge=1, le=10_000, description="least number of keypoints that agree"
+    )
     min_overlap: float = Field(
         default=0.25,
         ge=0,
@@ -97,11 +110,13 @@ class MatchSettings(Settings):
     max_distance: Metres = Field(
         default=0.025,
         gt=0,
+        le=100,
         description="largest median distance across the planes of surfels near each other; of all checks "
         "the hardest to pass for places that are built alike, and the first to widen for a poor sensor",
     )
     min_conditioning: float = Field(
         default=0.01,
         ge=0,
+        le=1,
         description="least eigenvalue of the alignment's information, per surfel",
     )

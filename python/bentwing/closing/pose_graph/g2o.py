@@ -16,6 +16,7 @@ import numpy as np
 
 from bentwing.base.atomic import write_text
 from bentwing.base.errors import InputError
+from bentwing.base.regular_file import require_regular
 from bentwing.closing.pose_graph.graph import (
     MAP,
     Links,
@@ -31,6 +32,8 @@ _VERTEX, _EDGE, _FIX = "VERTEX_SE3:QUAT", "EDGE_SE3:QUAT", "FIX"
 _ROTATION_FIRST = np.array([3, 4, 5, 0, 1, 2])
 _UPPER = np.triu_indices(6)
 _N_POSE, _N_INFORMATION = 7, 21
+_MOST_BYTES = 2**30
+_LONGEST_LINE = 10_000  # characters; what is longer is read as several lines
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,13 +70,14 @@ def read_g2o(path: Path | str) -> G2oGraph:
     """
     path = Path(path)
     lines = _Lines(path)
+    require_regular(path, _MOST_BYTES)
     try:
-        text = path.read_text(encoding="utf-8")
+        with path.open(encoding="utf-8") as file:
+            for number, line in enumerate(iter(lambda: file.readline(_LONGEST_LINE), ""), start=1):
+                lines.take(number, line)
     except (OSError, UnicodeDecodeError) as error:
         msg = f"{path}: not readable as a pose graph ({error})"
         raise InputError(msg) from error
-    for number, line in enumerate(text.splitlines(), start=1):
-        lines.take(number, line)
     return lines.finished()
 
 

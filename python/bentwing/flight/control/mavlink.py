@@ -4,22 +4,23 @@
 from __future__ import annotations
 
 import math
-import os
-from collections import Counter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bentwing.base import geometry
-from bentwing.base.errors import UsageError
 from bentwing.flight.control.link import Attitude, Distance, Message, Sticks
+from bentwing.flight.control.mavlink_endpoint import Endpoint, pymavlink
 from bentwing.flight.control.springs import N_SECTORS
 
 if TYPE_CHECKING:
+    from collections import Counter
+
     from typing_extensions import Self
 
     from bentwing.flight.control.springs import Springs
 
+LOOPBACK = "udpin:127.0.0.1:14550"
 _TEXT = 50  # characters of a STATUSTEXT
 _UNKNOWN = 65535  # cm, of OBSTACLE_DISTANCE
 _FULL_STICK = 1000.0  # of MANUAL_CONTROL
@@ -30,38 +31,48 @@ class MavlinkLink:
 
     MAVLink's body is forward, right, down with the nose up for positive pitch, and its yaw is
     clockwise: pitch and yaw change their sign here and nowhere else. Messages that are not finite
-    or out of range are dropped and counted in `refused`.
+    or out of range, not of the autopilot, or not signed where they have to be, are dropped and counted
+    in `refused`.
 
     Parameters
     ----------
-    address : as pymavlink has it: udpin:0.0.0.0:14550, udpout:127.0.0.1:14551, /dev/ttyACM0
+    address : as pymavlink has it: udpin:127.0.0.1:14550, udpout:192.168.1.10:14551, /dev/ttyACM0.
+        `udpin:0.0.0.0:14550` hears whoever reaches this computer: give it with a `key` only
     system : number of this system
-    target : number of the autopilot's system
+    target, component : numbers of the autopilot's system and component; nobody else is heard
+    pilot : number of the ground station whose MANUAL_CONTROL has the pilot's sticks; default: the
+        autopilot passes them on itself
+    key : 32 bytes that the autopilot has too: MAVLink 2 messages are signed with it, and others are
+        refused
 
     Raises
     ------
     UsageError
-        If pymavlink is not installed, or the address cannot be opened.
+        If pymavlink is not installed, the key has another length, or the address cannot be opened.
     """
 
-    def __init__(self, address: str, *, system: int = 1, target: int = 1) -> None:
-        mavutil = _mavutil()
-        self._dialect = mavutil.mavlink
-        try:
-            self._connection: Any = mavutil.mavlink_connection(
-                address, source_system=system, dialect="common"
-            )
-        except (OSError, ValueError) as error:
-            msg = f"{address}: cannot be opened as a MAVLink endpoint ({error})"
-            raise UsageError(msg) from error
-        self._target = target
+    def __init__(
+        self,
+        address: str = LOOPBACK,
+        *,
+        system: int = 1,
+        target: int = 1,
+        component: int = 1,
+        pilot: int | None = None,
+        key: bytes | None = None,
+    ) -> None:
+        peer = target, component
+        self._endpoint = Endpoint(address, system=system, peer=peer, pilot=pilot, key=key)
+        self._connection = self._endpoint.connection
+        self._dialect = pymavlink().mavlink
+        self._peer = peer
         self._time_ms = 0
-        self.refused: Counter[str] = Counter()
+        self.refused: Counter[str] = self._endpoint.refused
 
     def receive(self) -> list[Message]:
         """Return what has come since the last call, oldest first, without waiting."""
         found: list[Message] = []
-        while (raw := self._connection.recv_msg()) is not None:
+        for raw in self._endpoint.messages():
             kind = raw.get_type()
             if kind not in _READERS:
                 continue
@@ -92,7 +103,7 @@ class MavlinkLink:
             | self._dialect.ATTITUDE_TARGET_TYPEMASK_BODY_YAW_RATE_IGNORE
         )
         self._connection.mav.set_attitude_target_send(
-            self._time_ms, self._target, 1, mask, [w, x, y, z], 0.0, 0.0, 0.0, thrust
+            self._time_ms, *self._peer, mask, [w, x, y, z], 0.0, 0.0, 0.0, thrust
         )
 
     def send_gaps(self, springs: Springs, yaw: float) -> None:
@@ -121,7 +132,7 @@ class MavlinkLink:
 
     def close(self) -> None:
         """Close the endpoint."""
-        self._connection.close()
+        self._endpoint.close()
 
     def __enter__(self) -> Self:
         return self
@@ -139,7 +150,7 @@ def _attitude(raw: Any) -> Attitude | None:  # noqa: ANN401 - pymavlink is not t
 def _distance(raw: Any) -> Distance | None:  # noqa: ANN401
     if not raw.min_distance <= raw.current_distance <= raw.max_distance:
         return None
-    downward = raw.orientation == _mavutil().mavlink.MAV_SENSOR_ROTATION_PITCH_270
+    downward = raw.orientation == pymavlink().mavlink.MAV_SENSOR_ROTATION_PITCH_270
     return Distance(1e-3 * raw.time_boot_ms, 1e-2 * raw.current_distance, downward)
 
 
@@ -150,14 +161,3 @@ def _sticks(raw: Any) -> Sticks | None:  # noqa: ANN401
 
 
 _READERS = {"ATTITUDE": _attitude, "DISTANCE_SENSOR": _distance, "MANUAL_CONTROL": _sticks}
-
-
-def _mavutil() -> Any:  # noqa: ANN401 - pymavlink is not typed
-    # The only way to tell pymavlink the version; version 1 has no OBSTACLE_DISTANCE.
-    os.environ["MAVLINK20"] = "1"
-    try:
-        from pymavlink import mavutil
-    except ImportError as error:
-        msg = "MAVLink needs pymavlink: pip install 'bentwing[mavlink]'"
-        raise UsageError(msg) from error
-    return mavutil

@@ -25,6 +25,7 @@ from bentwing.recording.described import described_calibration
 
 if TYPE_CHECKING:
     from bentwing.base.estimate import Estimate
+    from bentwing.odometry.buffer import BatchBuffer
     from bentwing.odometry.continuous.odometry_pass import OdometryPass
     from bentwing.odometry.continuous.phases import Begun, Phase
     from bentwing.recording import Batch, Payload
@@ -126,7 +127,7 @@ class Continuous(Estimator):
             if now.windows and now.length >= shift:
                 passes.append(now)
         if not passes:
-            raise NotEnoughDataError(_too_short(shift, self._breaks))
+            raise NotEnoughDataError(_too_short(shift, self._breaks, self.buffer))
         return self._estimate(passes, self._breaks, self._first_turn)
 
     @property
@@ -246,11 +247,16 @@ def _new_data(phase: Begun) -> float:
     return now.settings.shift / (CAREFUL_STEPS if guessed else 1)
 
 
-def _too_short(least: float, breaks: list[Break]) -> str:
+def _too_short(least: float, breaks: list[Break], buffer: BatchBuffer) -> str:
     if not breaks:
-        return f"less than {least:g} s of lidar points; nothing can be estimated"
+        held = f"lidar points {_span(buffer.lidar_span)}, inertial samples {_span(buffer.imu_span)}"
+        return f"less than {least:g} s that can be estimated: {held}"
     first = breaks[0]
     return (
         f"no stretch of {least:g} s without a break, so that nothing can be estimated: {len(breaks)} "
         f"breaks, the first of the {first.sensor} data from {first.start:.2f} to {first.stop:.2f} s"
     )
+
+
+def _span(span: tuple[float, float] | None) -> str:
+    return "none" if span is None else f"from {span[0]:.2f} to {span[1]:.2f} s"

@@ -24,7 +24,9 @@ class KalmanSettings(Settings):
         description="edge of the map's finest voxels; each further level doubles it",
     )
     n_levels: int = Field(default=3, ge=1, le=6, description="number of voxel levels")
-    max_features: int = Field(default=1500, ge=50, description="most planar features of an update")
+    max_features: int = Field(
+        default=1500, ge=50, le=100_000, description="most planar features of an update"
+    )
     max_iterations: int = Field(default=4, ge=1, le=20, description="most iterations of an update")
     edges: bool = Field(default=True, description="whether to use depth edges beside planes")
     rotation: Literal["encoder", "ignored"] = Field(
@@ -35,6 +37,7 @@ class KalmanSettings(Settings):
     rehearsal: Seconds = Field(
         default=12.0,
         ge=0.0,
+        le=3600.0,
         description="time after which the filter begins again with the mount it has learned; 0: never",
     )
     odometry_rate: Annotated[float, Unit("Hz")] = Field(
@@ -42,7 +45,7 @@ class KalmanSettings(Settings):
     )
     smoothing: float = Field(
         default=0.62,
-        gt=0.0,
+        ge=0.001,
         le=1.0,
         description="low-pass factor of the smoothed odometry; 1: none",
     )

@@ -25,13 +25,13 @@ class NdtSettings(Settings):
     )
     n_levels: int = Field(default=3, ge=1, le=6, description="number of voxel levels")
     max_points: int = Field(
-        default=4000, ge=100, description="most points of a scan that are registered"
+        default=4000, ge=100, le=1_000_000, description="most points of a scan that are registered"
     )
     keyframe_distance: Metres = Field(
-        default=0.5, ge=0, description="motion of the lidar that makes a scan a keyframe"
+        default=0.5, ge=0, le=1e6, description="motion of the lidar that makes a scan a keyframe"
     )
     keyframe_angle: Radians = Field(
-        default=0.1, ge=0, description="turn of the lidar that makes a scan a keyframe"
+        default=0.1, ge=0, le=10, description="turn of the lidar that makes a scan a keyframe"
     )
     reference: Literal["keyframes", "last"] = Field(
         default="keyframes",

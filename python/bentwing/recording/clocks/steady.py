@@ -97,7 +97,8 @@ class SteadyClock:
         forgotten = max(oldest, self._next - MOST_BEHIND)
         del self._stamps_ns[:forgotten], self._spans[:forgotten]
         low = self._next = self._next - forgotten
-        high = bisect_left(self._stamps_ns, now_ns + BLOCK_NS)
+        # A stamp before those that were steadied already stands behind them, out of order.
+        high = max(low + 1, bisect_left(self._stamps_ns, now_ns + BLOCK_NS))
         zero_ns = self._stamps_ns[0]
         stamps = (np.array(self._stamps_ns, dtype=np.int64) - zero_ns) / NS_PER_S
         line = fit_clock(stamps, low, high, self._known(zero_ns))

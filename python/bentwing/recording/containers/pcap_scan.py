@@ -29,6 +29,7 @@ MAGICS = {
     b"\x4d\x3c\xb2\xa1": ("<", 1),
     b"\xa1\xb2\x3c\x4d": (">", 1),
 }
+MAX_EMPTY = 1000  # frames without a byte behind each other; more are a hole in the file
 PCAPNG = b"\x0a\x0d\x0d\x0a"
 MAX_FRAME = 1 << 18  # bytes; the largest that tcpdump writes, more is damage
 NOT_UDP, INCOMPLETE, OTHER = "other/not_udp", "udp/incomplete", "udp/other"
@@ -79,6 +80,7 @@ def scan_pcap(file: BinaryIO) -> Iterator[ScannedMessage | ScanEnd]:
     head = file.read(24)
     order, unit_ns = MAGICS[head[:4]]
     reader = DatagramReader(_link(head))
+    n_empty = 0
     while True:
         record = file.read(16)
         if not record:
@@ -88,7 +90,8 @@ def scan_pcap(file: BinaryIO) -> Iterator[ScannedMessage | ScanEnd]:
             yield ScanEnd(f"cut off at byte {file.tell()}")
             return
         seconds, fraction, size, _ = struct.unpack(f"{order}4I", record)
-        if size > MAX_FRAME:
+        n_empty = 0 if size else n_empty + 1
+        if size > MAX_FRAME or n_empty > MAX_EMPTY:
             yield ScanEnd(f"damaged at byte {file.tell() - 16} (a frame of {size} bytes)")
             return
         frame = file.read(size)

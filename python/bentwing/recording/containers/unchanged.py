@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""A recording is read several times; each time it must be the same."""
+"""A recording is read several times; each time it must be the same, and its names can be shown."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from bentwing.base.errors import RecordingError
+from bentwing.base.printable import printable
 from bentwing.base.provenance import files_of
 
 if TYPE_CHECKING:
@@ -13,6 +15,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from bentwing.recording.containers.interface import Source
+    from bentwing.recording.containers.scanned import TopicInfo
 
     _State = dict[Path, tuple[int, int, int]]  # inode, size and time of change of each file
 
@@ -21,6 +24,8 @@ _AT_REST = "copy the recording to a disk where nothing changes it, and run this 
 
 class UnchangedSource:
     """A source whose files are the same, and yield as many messages, in every pass.
+
+    Its topics and their types are printable: nothing else of it goes to a terminal as it stands.
 
     Raises
     ------
@@ -31,7 +36,9 @@ class UnchangedSource:
 
     def __init__(self, source: Source, paths: Sequence[Path], before: _State) -> None:
         self._source, self._paths, self._before = source, paths, before
-        self.topics, self.cdr = source.topics, source.cdr
+        self.topics, self.cdr = tuple(map(_shown, source.topics)), source.cdr
+        shown = zip(self.topics, source.topics, strict=True)
+        self._renamed = {own.name: given.name for own, given in shown if own.name != given.name}
         self.start_ns, self.end_ns = source.start_ns, source.end_ns
         self._most: dict[tuple[frozenset[str], int | None], int] = {}
         self._require_same()
@@ -48,9 +55,9 @@ class UnchangedSource:
         self._require_same()
         part, n = (frozenset(topics), start_ns), 0
         try:
-            for message in self._source.messages(topics, start_ns):
+            for topic, stamp_ns, data in self._messages(topics, start_ns):
                 n += 1
-                yield message
+                yield topic, stamp_ns, data
         except OSError as error:
             msg = (
                 f"{self._paths[0]}: cannot be read any more ({error.strerror or error}), after {n} "
@@ -72,6 +79,15 @@ class UnchangedSource:
         """Close the files."""
         self._source.close()
 
+    def _messages(
+        self, topics: Collection[str], start_ns: int | None
+    ) -> Iterator[tuple[str, int, bytes]]:
+        if not self._renamed:
+            return self._source.messages(topics, start_ns)
+        own = {self._renamed.get(topic, topic): topic for topic in topics}
+        found = self._source.messages(own, start_ns)
+        return ((own[topic], stamp_ns, data) for topic, stamp_ns, data in found)
+
     def _require_same(self) -> None:
         now = state_of(self._paths)
         changed = [path for path in self._before if now.get(path) != self._before[path]]
@@ -80,6 +96,10 @@ class UnchangedSource:
             what = "has changed" if path in now else "is gone or cannot be read any more,"
             msg = f"{path}: {what} while it was in use; {_AT_REST}"
             raise RecordingError(msg)
+
+
+def _shown(topic: TopicInfo) -> TopicInfo:
+    return replace(topic, name=printable(topic.name), type=printable(topic.type))
 
 
 def state_of(paths: Sequence[Path]) -> _State:

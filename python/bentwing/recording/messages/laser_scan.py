@@ -47,9 +47,12 @@ class LaserScans(LidarDecoder[RawScan]):
             return f"time per beam: stamp + i * {scan.time_increment * 1e6:.4g} us", None
         return None, None
 
-    def parse(self, raw: bytes, counts: Counter[str]) -> RawScan:  # noqa: ARG002 - nothing is left out yet
-        """Read a message."""
+    def parse(self, raw: bytes, counts: Counter[str]) -> RawScan:
+        """Read a message; one without beams has no geometry that could be wrong."""
         scan = self._read(raw, cdr=self.cdr)
+        if not len(scan.ranges):
+            counts["empty_scans"] += 1
+            return scan._replace(angle_min=0.0, angle_increment=0.0, time_increment=0.0)
         if not is_sane(scan):
             msg = "angles or times that cannot be computed with"
             raise wire.BrokenMessageError(msg)

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from bentwing.base.errors import PayloadError, RecordingError
+from bentwing.base.regular_file import require_regular
 from bentwing.recording.batches import LidarBatch
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+_MOST_OF_METADATA = 2**24  # bytes
 IS_VALID = 1  # bit of a column's status
 MAX_OFFSET_NS = 1_000_000_000  # of a column from its packet; more is damage
 INTENSITIES = ("SIGNAL", "REFLECTIVITY")  # the first that the profile has, as the ROS driver
@@ -58,6 +60,7 @@ def read_metadata(path: Path | str) -> str:
     PayloadError
         It cannot be read.
     """
+    require_regular(Path(path), _MOST_OF_METADATA, PayloadError)
     try:
         return Path(path).read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:

@@ -18,6 +18,9 @@ from bentwing.recording.sections.section import NonNegative, Offset, Positive, S
 MAX_ESTIMATED_LATENCY = 0.05
 
 
+FARTHEST = 10_000.0  # m; beams are followed cell by cell to their ends
+
+
 class Lidar(Section):
     """The lidar.
 
@@ -40,7 +43,7 @@ class Lidar(Section):
     model: VelodyneModel | None = None
     metadata: Annotated[str, Field(min_length=1)] | None = None
     min_range: Annotated[NonNegative, Unit("m")] = 0.0
-    max_range: Annotated[Positive, Unit("m")] = 0.0
+    max_range: Annotated[Positive, Field(le=FARTHEST), Unit("m")] = 0.0
     range_sigma: Annotated[Positive, Unit("m, one standard deviation")] = 0.0
     latency: Offset = 0.0
     mirrored: bool = False

@@ -12,8 +12,9 @@ from bentwing.base.mount import Pose
 from bentwing.base.units import Unit
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+MOST = 1e9  # of any quantity of a head in its unit; beyond it squares and products end
+Positive = Annotated[float, Field(gt=0, le=MOST, allow_inf_nan=False)]
+NonNegative = Annotated[float, Field(ge=0, le=MOST, allow_inf_nan=False)]
 Vector = tuple[Finite, Finite, Finite]
 Quaternion = tuple[Finite, Finite, Finite, Finite]
 Offset = Annotated[float, Field(ge=-1.5, le=1.5, allow_inf_nan=False), Unit("s")]

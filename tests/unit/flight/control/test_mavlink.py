@@ -19,14 +19,22 @@ from bentwing.flight.control.springs import Springs
 os.environ["MAVLINK20"] = "1"  # pymavlink reads it when it is imported
 mavutil = pytest.importorskip("pymavlink.mavutil", reason="the extra `mavlink` is not installed")
 from bentwing.flight.control.mavlink import MavlinkLink  # noqa: E402
+from bentwing.flight.control.mavlink_endpoint import MOST_AT_ONCE  # noqa: E402
 
 PATIENCE = 5.0
+
+
+def at(address, system=1, component=1):
+    """An endpoint of another program."""
+    return mavutil.mavlink_connection(
+        address, source_system=system, source_component=component, dialect="common"
+    )
 
 
 @pytest.fixture
 def pair():
     """An autopilot and the link to it."""
-    autopilot = mavutil.mavlink_connection("udpin:127.0.0.1:0", dialect="common")
+    autopilot = at("udpin:127.0.0.1:0")
     port = autopilot.port.getsockname()[1]
     with MavlinkLink(f"udpout:127.0.0.1:{port}") as link:
         link.send_warning("hello")  # an endpoint answers to who has spoken
@@ -113,3 +121,106 @@ def test_an_address_that_cannot_be_opened_is_named():
     with pytest.raises(UsageError, match="nowhere"):
         MavlinkLink("udpin:nowhere.invalid:1")
     gc.collect()
+
+
+ATTITUDE = (1, 0.1, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@pytest.fixture
+def listening():
+    """A function that makes a link that others call, and says where; all ends are closed."""
+    ends = []
+
+    def make(**options):
+        link = MavlinkLink("udpin:127.0.0.1:0", **options)
+        port = link._connection.port.getsockname()[1]
+
+        def caller(system=1, component=1):
+            ends.append(at(f"udpout:127.0.0.1:{port}", system, component))
+            return ends[-1]
+
+        ends.append(link)
+        return link, caller
+
+    yield make
+    for end in ends:
+        end.close()
+
+
+def test_only_the_autopilot_is_heard_and_answered(listening):
+    link, caller = listening()
+    others = [caller(system=2), caller(component=7), caller(system=255, component=190)]
+    for other in others:
+        other.mav.attitude_send(*ATTITUDE)
+        other.mav.manual_control_send(1, 500, 0, 0, 0, 0)
+    assert received(link, 6) == []
+    assert link.refused == {"another sender": 6}
+    link.send_warning("to nobody")
+    autopilot = caller()
+    autopilot.mav.attitude_send(*ATTITUDE)
+    assert len(received(link, 7)) == 1
+    link.send_warning("to the autopilot")
+    assert heard(autopilot, "STATUSTEXT").text == "to the autopilot"
+    assert all(other.recv_msg() is None for other in others)
+
+
+def test_who_feigns_the_numbers_of_the_autopilot_from_elsewhere_is_not_heard_beside_it(listening):
+    link, caller = listening()
+    autopilot, impostor = caller(), caller()
+    autopilot.mav.attitude_send(*ATTITUDE)
+    assert len(received(link, 1)) == 1
+    impostor.mav.attitude_send(*ATTITUDE)
+    assert received(link, 1) == []
+    assert link.refused == {"another address": 1}
+
+
+def test_the_sticks_may_come_from_a_ground_station_that_is_named(listening):
+    link, caller = listening(pilot=255)
+    station = caller(system=255, component=190)
+    station.mav.attitude_send(*ATTITUDE)
+    station.mav.manual_control_send(1, 500, 0, 400, 0, 0)
+    assert received(link, 2) == [Sticks(roll=0.0, pitch=0.5, thrust=0.4)]
+
+
+def test_with_a_key_what_is_not_signed_with_it_is_refused(listening):
+    key = bytes(range(32))
+    link, caller = listening(key=key)
+    plain, wrong = caller(), caller()
+    wrong.setup_signing(bytes(32), sign_outgoing=True)
+    for end in (plain, wrong):
+        end.mav.attitude_send(*ATTITUDE)
+    assert received(link, 2) == []
+    assert link.refused == {"damaged or not signed": 2}
+    autopilot = caller()
+    autopilot.setup_signing(key, sign_outgoing=True)
+    autopilot.mav.attitude_send(*ATTITUDE)
+    assert len(received(link, 3)) == 1
+    link.send_warning("signed")
+    assert heard(autopilot, "STATUSTEXT").get_signed()
+
+
+def test_a_key_of_another_length_is_refused():
+    with pytest.raises(UsageError, match="key: expected 32 bytes, got 3"):
+        MavlinkLink("udpin:127.0.0.1:0", key=b"abc")
+
+
+def test_a_flood_does_not_hold_up_the_caller(listening):
+    link, caller = listening()
+    autopilot = caller()
+    for _ in range(2 * MOST_AT_ONCE):
+        autopilot.mav.attitude_send(*ATTITUDE)
+    until, found = time.monotonic() + PATIENCE, []
+    while not found and time.monotonic() < until:
+        found = link.receive()
+    assert 0 < len(found) <= MOST_AT_ONCE
+
+
+def test_bytes_that_are_no_messages_are_counted_and_nothing_else(listening):
+    link, caller = listening()
+    noise, rng = caller(), np.random.default_rng(1)
+    for _ in range(200):
+        noise.port.sendto(rng.bytes(int(rng.integers(1, 300))), noise.destination_addr)
+    until = time.monotonic() + 1.0
+    while time.monotonic() < until and not link.refused:
+        assert link.receive() == []
+    assert set(link.refused) <= {"damaged or not signed", "another sender"}

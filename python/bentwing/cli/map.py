@@ -63,11 +63,9 @@ def command(
     # slow to import, so only when it is needed
     from bentwing.base.errors import UsageError
     from bentwing.base.progress import create_progress
-    from bentwing.calibrate.outcome import with_motion
     from bentwing.cli.done import say_maps, say_run
     from bentwing.recording.flights import flights_of
     from bentwing.run.choose import choose, given
-    from bentwing.run.flights import map_flights
     from bentwing.run.pipeline import run_recording
 
     options_given = given(
@@ -91,6 +89,8 @@ def command(
     progress = create_progress(quiet=quiet)
     flights = flights_of(recording) if len(recording) > 1 else [recording]
     if len(flights) > 1:
+        from bentwing.run.flights import map_flights
+
         if write_payload is not None:
             msg = (
                 f"--write-payload with {len(flights)} flights: each finds the head anew; give it with "
@@ -102,5 +102,7 @@ def command(
         return
     found = run_recording(recording, out, chosen, payload, resume=resume, progress=progress)
     if write_payload is not None and found.estimate is not None and found.payload is not None:
+        from bentwing.calibrate.outcome import with_motion
+
         with_motion(found.payload, found.estimate.calibration).save(write_payload)
     say_run(out, found.verdict, quiet=quiet)

@@ -7,9 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bentwing.base.errors import RecordingError
-from bentwing.calibrate.draft import draft_payload
 from bentwing.calibrate.inspection import judge
-from bentwing.calibrate.set_up import find_set_up
 from bentwing.recording import Payload, Recording
 from bentwing.recording.preprocess import RecordingPart
 
@@ -57,6 +55,8 @@ class Head:
         self.set_up: SetUp | None = None
         self._progress = progress
         if settings.payload == Payload.default():
+            from bentwing.calibrate.draft import draft_payload
+
             self._describe(draft_payload(self.paths).payload)
         self.recording = Recording(self.paths, self.settings.payload, strict=False)
 
@@ -104,6 +104,8 @@ class Head:
 
     def found(self) -> SetUp:
         """Return the head as the recording shows it; takes some seconds, of a 2D lidar up to a minute."""
+        from bentwing.calibrate.set_up import find_set_up
+
         self._progress.note("looking for the set-up of the sensor head in the recording")
         settings = self.settings
         return find_set_up(

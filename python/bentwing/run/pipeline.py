@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 from bentwing import odometry
 from bentwing.base.progress import as_progress
-from bentwing.closing.localize import read_prior_map
 from bentwing.run import stages
 from bentwing.run.beams import read_by
 from bentwing.run.check import opened
@@ -166,8 +165,11 @@ def _open_inputs(job: stages.Job, payload_file: Path | str | None) -> PriorMap |
     with folder.stage("inputs"):
         described = [] if payload_file is None else [Path(payload_file)]
         folder.add_inputs([*recording.paths, *described])
-        known = None if prior is None else read_prior_map(prior, job.settings.closing.surfels)
-        if known is not None:
+        known = None
+        if prior is not None:
+            from bentwing.closing.localize import read_prior_map
+
+            known = read_prior_map(prior, job.settings.closing.surfels)
             folder.add_inputs([known.file])
         folder.add_recordings(recording.paths, recording.clock.start_ns)
     return known

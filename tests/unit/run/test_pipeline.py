@@ -17,6 +17,7 @@ from bentwing.base.errors import EstimationError, UsageError
 from bentwing.base.estimate import Estimate
 from bentwing.base.progress import Progress
 from bentwing.base.trajectory import Trajectory, read_tum
+from bentwing.calibrate import set_up
 from bentwing.calibrate.inspection import Judgement
 from bentwing.calibrate.set_up import SetUp
 from bentwing.closing.global_registration import GlobalSettings
@@ -97,7 +98,7 @@ class FakeEstimator:
 def recording(tmp_path, monkeypatch):
     monkeypatch.setattr(head, "Recording", FakeRecording)
     monkeypatch.setattr(head, "judge", lambda *_, **__: Judgement([], [], None, 1.0))
-    monkeypatch.setattr(head, "find_set_up", lambda _, payload, *__, **___: SetUp(payload))
+    monkeypatch.setattr(set_up, "find_set_up", lambda _, payload, *__, **___: SetUp(payload))
     monkeypatch.setattr(odometry, "create", lambda *_: FakeEstimator(), raising=False)
     (tmp_path / "yard.mcap").write_bytes(b"recording")
     return [tmp_path / "yard.mcap"]

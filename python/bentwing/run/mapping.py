@@ -81,7 +81,7 @@ def write_map(
     record: dict[str, Any] = {}
     chunks = clean(
         in_turn(sources, counts),
-        path,
+        folder.path,
         duration=duration,
         settings=settings.cleaning,
         counts=counts,

@@ -132,6 +132,7 @@ def run_recording(
     with (
         opened(paths, settings, watch) as head,
         RunFolder(Path(out), settings.to_json(), resume=resume, inputs=map(Path, read)) as folder,
+        head.keeping(folder.path),
     ):
         folder.record.settings = head.settings.to_json()
         job = stages.Job(head.part, folder, head.settings, watch)

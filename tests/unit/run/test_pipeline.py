@@ -307,3 +307,17 @@ def test_the_settings_of_the_closing_are_those_that_are_used(tmp_path, recording
     record = record_of(tmp_path / "out")
     assert record["settings"]["loop_closure"]["memory_mb"] == 100.0
     assert record["loop_closure"]["budget"]["megabytes"] <= 100.0
+
+
+def test_a_recording_is_decoded_once_for_all_stages(tmp_path, recording, monkeypatch):
+    n_passes = []
+    decoded = FakeRecording.batches
+
+    def counted(*arguments, **options):
+        n_passes.append(arguments)
+        return decoded(*arguments, **options)
+
+    monkeypatch.setattr(FakeRecording, "batches", counted)
+    # its accelerations are zero, so that otherwise the head is looked for
+    pipeline.map_recording(recording, PAYLOAD, tmp_path / "out", trust_payload=True)
+    assert len(n_passes) == 1

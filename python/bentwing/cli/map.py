@@ -38,6 +38,12 @@ def command(
             options.ESTIMATION, "--no-loop-closure", help="Leave the trajectory open-loop."
         ),
     ] = False,
+    no_map: Annotated[
+        bool,
+        options.option(
+            options.MAP, "--no-map", help="Leave the map out: the trajectory alone, much sooner."
+        ),
+    ] = False,
     write_payload: options.WritePayload = None,
     threads: options.Threads = None,
     start: options.Start = None,
@@ -75,6 +81,7 @@ def command(
         cleaning=options.cleaning(keep_mixed=keep_mixed, keep_moving=keep_moving),
         georeferencing=given(mode=georeference, epsg=epsg, control_points=control_points),
         loop_closure=False if no_loop_closure else None,
+        writes_map=False if no_map else None,
         threads=threads,
         start=start,
         duration=duration,
@@ -91,6 +98,12 @@ def command(
     if len(flights) > 1:
         from bentwing.run.flights import map_flights
 
+        if not chosen.writes_map:
+            msg = (
+                f"--no-map with {len(flights)} flights: they are merged into one map; give one "
+                "recording, or leave it out"
+            )
+            raise UsageError(msg)
         if write_payload is not None:
             msg = (
                 f"--write-payload with {len(flights)} flights: each finds the head anew; give it with "

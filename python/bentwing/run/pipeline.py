@@ -45,6 +45,7 @@ def map_recording(
     cleaning: CleanSettings | None = None,
     georeferencing: GeoreferenceSettings | None = None,
     loop_closure: bool = True,
+    write_map: bool = True,
     prior_map: Path | str | None = None,
     settings: EstimatorSettings | Path | str | None = None,
     threads: int | None = None,
@@ -69,6 +70,7 @@ def map_recording(
     georeferencing : how GNSS fixes and control points are used; default: fixes, where the payload
         names their topic, as a rigid fit
     loop_closure : whether places seen again may correct the trajectory
+    write_map : whether there is a map; without one the run ends with its trajectory, much sooner
     prior_map : a run folder or a cloud in which the recording is localized: trajectory and map are
         then in its frame, and the points that have changed are written too
     settings : of the estimator, or a YAML file of what `bentwing map --print-settings` prints, all or
@@ -94,6 +96,7 @@ def map_recording(
         cleaning=cleaning,
         georeferencing=georeferencing,
         loop_closure=None if loop_closure else False,
+        writes_map=None if write_map else False,
         prior_map=prior_map,
         threads=threads,
         start=start,
@@ -154,7 +157,8 @@ def run_recording(
                 found = _keep(job, stages.close(job, found))
                 checkpoint.save("loops", found)
             found = _keep(job, stages.place_on_earth(job, found))
-            found = _keep(job, stages.make_map(job, found))
+            last = stages.make_map if settings.writes_map else stages.leave_without_map
+            found = _keep(job, last(job, found))
             report_run(folder, found)
             checkpoint.discard()
     return replace(found, payload=head.settings.payload)

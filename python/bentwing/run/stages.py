@@ -178,6 +178,16 @@ def make_map(job: Job, found: Found) -> Found:
     return replace(found, map=written, accuracy=accuracy, evidence=(*found.evidence, *evidence))
 
 
+def leave_without_map(job: Job, found: Found) -> Found:
+    """Say how accurate the trajectory is expected to be, where no map is asked for."""
+    from bentwing.evaluate.expected import expected_accuracy
+
+    accuracy = expected_accuracy(_known(found), job.part.payload.lidar.range_sigma)
+    if accuracy is not None:
+        accuracy = replace(accuracy, map_thickness=None)
+    return replace(found, accuracy=accuracy)
+
+
 def _difference(job: Job, estimate: Estimate) -> Difference | None:
     if job.prior is None:
         return None

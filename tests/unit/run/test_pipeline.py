@@ -309,6 +309,32 @@ def test_the_settings_of_the_closing_are_those_that_are_used(tmp_path, recording
     assert record["loop_closure"]["budget"]["megabytes"] <= 100.0
 
 
+def test_without_a_map_the_run_ends_with_its_trajectory_and_says_so(tmp_path, recording):
+    whole = pipeline.map_recording(recording, PAYLOAD, tmp_path / "whole")
+    run = pipeline.map_recording(recording, PAYLOAD, tmp_path / "out", write_map=False)
+    names = {file.name for file in run.out.iterdir()}
+    assert names == {
+        "trajectory.txt",
+        "trajectory_covariance.txt",
+        "odometry.txt",
+        "report.html",
+        "run.json",
+    }
+    for name in ("trajectory.txt", "trajectory_covariance.txt", "odometry.txt"):
+        assert (run.out / name).read_bytes() == (whole.out / name).read_bytes()
+    record = record_of(run.out)
+    assert record["complete"] is True
+    assert record["map"] == {}
+    assert not any(name.startswith("map.") for name in record["counts"])
+    assert "map" not in record["timings"]
+    assert record["expected_accuracy"]["map_thickness"] is None
+    page = run.report_path.read_text()
+    assert "No map was asked for" in page
+    assert "Expected accuracy" in page
+    assert "surfaces in the map scatter" not in page
+    assert run.map_path is Run.load(run.out).map_path is None
+
+
 def test_a_recording_is_decoded_once_for_all_stages(tmp_path, recording, monkeypatch):
     n_passes = []
     decoded = FakeRecording.batches

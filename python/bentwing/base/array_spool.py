@@ -10,6 +10,7 @@ import shutil
 from array import array
 from contextlib import suppress
 from dataclasses import fields
+from math import prod
 from tempfile import TemporaryFile
 from threading import Lock
 from typing import TYPE_CHECKING, Any
@@ -131,7 +132,7 @@ def columns_of(value: DataclassInstance) -> dict[str, NDArray[Any]]:
 
 def _row_size(column: tuple[str, np.dtype[Any], tuple[int, ...]]) -> int:
     _, dtype, shape = column
-    return int(dtype.itemsize * np.prod(shape, dtype=int))
+    return dtype.itemsize * prod(shape)
 
 
 def _columns(data: NDArray[np.uint8], layout: _Layout, n_rows: int) -> dict[str, NDArray[Any]]:

@@ -83,7 +83,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"map.{options.format}"
         chunks = project(batches(n, flight), flight, calibration, counts=counts)
-        chunks = clean(chunks, path, duration=n / RATE, counts=counts, record=record)
+        chunks = clean(chunks, path.parent, duration=n / RATE, counts=counts, record=record)
         with open_map(path, options.format, 0) as writer:
             for chunk in thin(chunks, options.spacing, counts):
                 writer.write(chunk)

@@ -58,6 +58,46 @@ _Returned: TypeAlias = tuple[list[float], list[float]]
 """The same as it is returned."""
 _Poses: TypeAlias = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
 
+def las_records(
+    points: NDArray[np.float64],
+    *,
+    times: NDArray[np.float64],
+    ranges: NDArray[np.float32],
+    intensity: NDArray[np.float32] | None,
+    ring: NDArray[np.uint16] | None,
+    incidence: NDArray[np.float32] | None,
+    thickness: NDArray[np.float32] | None,
+    run_id: NDArray[np.uint16] | None,
+    stored: Sequence[str],
+    offsets: tuple[float, float, float],
+    step: float,
+    gps_origin: float,
+    intensity_scale: float,
+    threads: int = 0,
+) -> NDArray[np.uint8]:
+    """Return points as the records of a LAS 1.4 file, point format 6, one behind the other.
+
+    Angles are rounded to an eighth of a degree, thicknesses to 1/8192 m: further digits mean nothing, and
+    would be most of what a compressed point takes. Intensities that are no numbers are 0.
+
+    Parameters
+    ----------
+    points : (N, 3) m
+    times : (N,) s
+    ranges : (N,) m, the first extra bytes
+    intensity, ring, incidence, thickness, run_id : (N,), angles in rad, thickness in m; None is stored as 0
+    stored : names of `ring`, `incidence`, `thickness` and `run_id` that follow as extra bytes
+    offsets : taken off the points, m
+    step : of the coordinates, m
+    gps_origin : added to the times, s
+    intensity_scale : by which intensities are multiplied, rounded and held within 16 bits
+
+    Raises
+    ------
+    EstimationError
+        If a point is too far from the offsets for 32 bits.
+    """
+
 @final
 class LazCompressor:
     """Appends compressed points to a LAZ file whose header is written already.

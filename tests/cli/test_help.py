@@ -143,3 +143,15 @@ def test_the_papers_and_parts_of_options_are_those_there_are():
 )
 def test_the_shell_completes_commands_options_and_choices(words, offered):
     assert set(completed(*words)) == offered
+
+
+@pytest.mark.parametrize(("given", "used"), [(None, "1"), ("3", "3")])
+def test_matrices_are_computed_by_one_thread_unless_the_user_says_otherwise(given, used):
+    script = (
+        "import os, sys; sys.argv = ['bentwing', '--version']\n"
+        "from bentwing.cli.main import run\n"
+        "try: run()\n"
+        "except SystemExit: print(os.environ['OPENBLAS_NUM_THREADS'])"
+    )
+    environment = {} if given is None else {"OPENBLAS_NUM_THREADS": given}
+    assert run_python(script, **environment).splitlines()[-1] == used

@@ -97,7 +97,7 @@ def test_options_reach_the_pipeline(called, capsys, monkeypatch, tmp_path):
         "map", "a.mcap", "b.mcap", "--payload", str(head), "-o", "out", "--map-format", "ply",
         "--map-spacing", "0.02", "--no-loop-closure", "--threads", "2", "--start", "5",
         "--duration", "60", "--keep-moving", "--epsg", "25832", "--control-points", "targets.csv",
-        "--quiet",
+        "--no-map", "--quiet",
     ]  # fmt: skip
     assert run_command(arguments) == 0
     ((paths, out, chosen, payload), options) = called[0]
@@ -109,6 +109,7 @@ def test_options_reach_the_pipeline(called, capsys, monkeypatch, tmp_path):
         map_format="ply",
         map_spacing=0.02,
         loop_closure=False,
+        writes_map=False,
         threads=2,
         start=5.0,
         duration=60.0,
@@ -206,3 +207,10 @@ sys.argv = ["bentwing", "map", "a", "-o", {str(tmp_path)!r}]
     _, err = process.communicate(timeout=20)
     assert process.returncode == 130
     assert err == "bentwing: error: interrupted\n"
+
+
+def test_several_flights_without_a_map_are_refused(called, capsys, monkeypatch):
+    monkeypatch.setattr("bentwing.recording.flights.flights_of", lambda paths: [[p] for p in paths])
+    assert run_command(["map", "a.mcap", "b.mcap", "-o", "out", "--no-map"]) == 2
+    assert "--no-map with 2 flights" in capsys.readouterr().err
+    assert called == []

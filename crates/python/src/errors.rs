@@ -2,6 +2,7 @@
 //! The one place that releases the GIL, and the one that turns Rust errors into Python's.
 
 use bentwing_kalman::KalmanError;
+use bentwing_las::LasError;
 use bentwing_ndt::NdtError;
 use bentwing_pose_graph::GraphError;
 use bentwing_registration::SolveError;
@@ -61,6 +62,11 @@ pub(crate) fn ndt_error(py: Python<'_>, error: &NdtError) -> PyErr {
         _ => "EstimationError",
     };
     raised(py, name, &error.to_string())
+}
+
+/// The Python exception for points that no file can hold.
+pub(crate) fn las_error(py: Python<'_>, error: &LasError) -> PyErr {
+    raised(py, "EstimationError", &error.to_string())
 }
 
 /// The Python exception for a filter that cannot go on.

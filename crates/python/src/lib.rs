@@ -14,6 +14,7 @@ mod errors;
 mod global;
 mod globals;
 mod kalman;
+mod las;
 mod laz;
 mod ndt;
 mod pose_graph;
@@ -35,6 +36,8 @@ mod _core {
     use crate::globals::Globals;
     #[pymodule_export]
     use crate::kalman::{KalmanFilter, KalmanSweep};
+    #[pymodule_export]
+    use crate::las::las_records;
     #[pymodule_export]
     use crate::laz::LazCompressor;
     #[pymodule_export]

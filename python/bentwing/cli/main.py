@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 INTERRUPTED = 130
 _UNEXPECTED = 70  # EX_SOFTWARE of sysexits.h
+# Matrices here are small: the threads of a BLAS would wait for each other most of the time, beside ours.
+_BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 _DEBUG = "BENTWING_DEBUG"
 
 _NO_ROOM = "; make room there, or name another folder"
@@ -74,6 +76,8 @@ def _options(
 
 def run() -> None:
     """Run the command line and end the process with its exit code."""
+    for name in _BLAS_THREADS:  # read when numpy is imported
+        os.environ.setdefault(name, "1")
     # Whoever ends the process finds the reason in the record, as after Ctrl-C.
     for name in ("SIGTERM", "SIGHUP"):
         number = getattr(signal, name, None)  # Windows has no SIGHUP

@@ -38,6 +38,12 @@ def command(
             options.ESTIMATION, "--no-loop-closure", help="Leave the trajectory open-loop."
         ),
     ] = False,
+    no_map: Annotated[
+        bool,
+        options.option(
+            options.MAP, "--no-map", help="Leave the map out: the trajectory alone, much sooner."
+        ),
+    ] = False,
     write_payload: options.WritePayload = None,
     threads: options.Threads = None,
     start: options.Start = None,
@@ -63,11 +69,9 @@ def command(
     # slow to import, so only when it is needed
     from bentwing.base.errors import UsageError
     from bentwing.base.progress import create_progress
-    from bentwing.calibrate.outcome import with_motion
     from bentwing.cli.done import say_maps, say_run
     from bentwing.recording.flights import flights_of
     from bentwing.run.choose import choose, given
-    from bentwing.run.flights import map_flights
     from bentwing.run.pipeline import run_recording
 
     options_given = given(
@@ -77,6 +81,7 @@ def command(
         cleaning=options.cleaning(keep_mixed=keep_mixed, keep_moving=keep_moving),
         georeferencing=given(mode=georeference, epsg=epsg, control_points=control_points),
         loop_closure=False if no_loop_closure else None,
+        writes_map=False if no_map else None,
         threads=threads,
         start=start,
         duration=duration,
@@ -91,6 +96,14 @@ def command(
     progress = create_progress(quiet=quiet)
     flights = flights_of(recording) if len(recording) > 1 else [recording]
     if len(flights) > 1:
+        from bentwing.run.flights import map_flights
+
+        if not chosen.writes_map:
+            msg = (
+                f"--no-map with {len(flights)} flights: they are merged into one map; give one "
+                "recording, or leave it out"
+            )
+            raise UsageError(msg)
         if write_payload is not None:
             msg = (
                 f"--write-payload with {len(flights)} flights: each finds the head anew; give it with "
@@ -102,5 +115,7 @@ def command(
         return
     found = run_recording(recording, out, chosen, payload, resume=resume, progress=progress)
     if write_payload is not None and found.estimate is not None and found.payload is not None:
+        from bentwing.calibrate.outcome import with_motion
+
         with_motion(found.payload, found.estimate.calibration).save(write_payload)
     say_run(out, found.verdict, quiet=quiet)

@@ -31,7 +31,8 @@ class ExpectedAccuracy:
     horizontal_per_10m, vertical_per_10m, heading_per_10m : of a pose as seen from the one ten metres of
         path before, in the mean
     map_thickness : m, standard deviation of points across the surfaces of the map: of the ranges' noise,
-        and of how far apart two visits have seen the same; without any of the poses over ten metres
+        and of how far apart two visits have seen the same; without any of the poses over ten metres;
+        None where there is no map
     """
 
     horizontal: float
@@ -40,16 +41,18 @@ class ExpectedAccuracy:
     horizontal_per_10m: float
     vertical_per_10m: float
     heading_per_10m: float
-    map_thickness: float
+    map_thickness: float | None
 
     def sentence(self) -> str:
         """Say it in a sentence."""
         whole = _named(self.horizontal, self.vertical, self.heading)
         short = _named(self.horizontal_per_10m, self.vertical_per_10m, self.heading_per_10m)
-        return (
-            f"Expected accuracy (68 %): over the whole path {whole}; over ten metres of it {short}; "
-            f"surfaces in the map scatter by {1e3 * self.map_thickness:.0f} mm."
+        said = (
+            f"Expected accuracy (68 %): over the whole path {whole}; over ten metres of it {short}"
         )
+        if self.map_thickness is None:
+            return f"{said}."
+        return f"{said}; surfaces in the map scatter by {1e3 * self.map_thickness:.0f} mm."
 
 
 def expected_accuracy(

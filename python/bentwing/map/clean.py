@@ -10,8 +10,9 @@ import numpy as np
 from pydantic import Field
 
 from bentwing import _core
+from bentwing.base.array_spool import ArraySpool, columns_of
 from bentwing.base.settings import Settings
-from bentwing.map.spool import ChunkSpool
+from bentwing.map.chunk import MapChunk
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from bentwing.map.chunk import MapChunk
 
 EDGE = 0.2  # m; a cell holds a piece of a wall, and not two of them
 MAX_CELLS = 1_500_000  # about 300 bytes each while beams are followed
@@ -48,7 +48,7 @@ class CleanSettings(Settings):
 
 def clean(
     chunks: Iterable[MapChunk],
-    path: Path,
+    folder: Path,
     *,
     duration: float,
     settings: CleanSettings | None = None,
@@ -63,7 +63,7 @@ def clean(
     Parameters
     ----------
     chunks : as `project` yields them
-    path : of the map; the temporary file stands beside it
+    folder : of the temporary file, about 60 bytes per point
     duration : s, about how long the recording is
     settings : what is left out; default: all that the settings name
     counts : receives `map.mixed_pixels` and `map.moving`, the points left out
@@ -80,7 +80,7 @@ def clean(
     for name in ("map.mixed_pixels", "map.moving"):
         counts.setdefault(name, 0)
     survey: _core.MapSurvey | None = None
-    with ChunkSpool(path) as spool:
+    with ArraySpool(folder) as spool:
         for chunk in chunks:
             survey = survey or _survey(chunk, duration)
             survey.add(
@@ -91,15 +91,15 @@ def clean(
                 doubtful=_doubtful(chunk),
                 threads=n_threads,
             )
-            spool.add(chunk)
+            spool.add(columns_of(chunk))
         if survey is None:
             return
         cells = survey.finish(threads=n_threads)
         if record is not None:
             record["cell_edge"], record["cells"] = cells.edge, cells.n_cells
             record["moving_cells"], record["beams_followed"] = cells.n_moving, cells.n_rays
-        for chunk in spool.chunks():
-            yield _cleaned(chunk, cells, settings, counts, n_threads)
+        for columns in spool.tables():
+            yield _cleaned(MapChunk(**columns), cells, settings, counts, n_threads)
 
 
 def _survey(first: MapChunk, duration: float) -> _core.MapSurvey:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Generator, Iterable
 
     from numpy.typing import NDArray
 
@@ -41,7 +41,7 @@ class MapSample:
         """Times of the sampled points, (K,) s since the recording's start."""
         return np.concatenate(self._times) if self._times else np.empty(0)
 
-    def watch(self, chunks: Iterable[MapChunk]) -> Iterator[MapChunk]:
+    def watch(self, chunks: Iterable[MapChunk]) -> Generator[MapChunk, None, None]:
         """Pass a stream of chunks on unchanged, sampling it."""
         for chunk in chunks:
             self.add(chunk)

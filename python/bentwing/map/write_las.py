@@ -9,7 +9,7 @@ import laspy
 import numpy as np
 from laspy.vlrs.known import WktCoordinateSystemVlr
 
-from bentwing.base.errors import EstimationError
+from bentwing import _core
 from bentwing.map.compress_laz import LazBackend
 from bentwing.map.gps_time import adjusted_gps_origin
 from bentwing.map.writer import MapWriter, round_offset
@@ -30,7 +30,13 @@ _EXTRA: dict[str, tuple[type[np.generic], str]] = {
     "thickness": (np.float32, "m, 1 sigma across the surface"),
     "run_id": (np.uint16, "number of the run"),
 }
-_ONLY_RETURN = 0x11  # return number 1 in the lower four bits, number of returns 1 in the upper
+# What the records are made of beside the points.
+_COLUMNS: dict[str, type[np.generic]] = {
+    "times": np.float64,
+    "ranges": np.float32,
+    "intensity": np.float32,
+    **{name: kind for name, (kind, _) in _EXTRA.items()},
+}
 
 
 class LasWriter(MapWriter):
@@ -57,36 +63,21 @@ class LasWriter(MapWriter):
         )
 
     def _append(self, chunk: MapChunk) -> None:
-        record = laspy.ScaleAwarePointRecord.zeros(len(chunk), header=self._header)
-        table = record.array
-        for axis, name in enumerate("XYZ"):
-            table[name] = self._steps(chunk.points, axis)
-        table["gps_time"] = self._gps_origin + chunk.times
-        table["bit_fields"] = _ONLY_RETURN
-        table["range"] = chunk.ranges
-        if chunk.intensity is not None:
-            scaled = np.nan_to_num(chunk.intensity) * self._intensity_scale
-            table["intensity"] = np.clip(np.rint(scaled), 0, _MAX_INTENSITY)
-        for name in _EXTRA:
-            values = getattr(chunk, name)
-            if values is not None and name in table.dtype.names:
-                table[name] = _stored(name, values)
-        if chunk.run_id is not None:
-            table["point_source_id"] = chunk.run_id
-        self._writer.write_points(record)
-
-    def _steps(self, points: NDArray[np.float64], axis: int) -> NDArray[np.float64]:
-        """Whole numbers `(N,)` of `SCALE` along one axis; refuses what int32 cannot hold."""
-        steps: NDArray[np.float64] = points[:, axis] - self._header.offsets[axis]
-        steps /= SCALE
-        np.rint(steps, out=steps)
-        if len(steps) and max(steps.max(), -steps.min()) > np.iinfo(np.int32).max:
-            far = points[np.argmax(np.abs(steps))].round(1).tolist()
-            msg = (
-                f"a map point lies at {far} m, too far for a LAS file; the trajectory has diverged"
-            )
-            raise EstimationError(msg)
-        return steps
+        point_format = self._header.point_format
+        columns: dict[str, Any] = {
+            name: _column(chunk, name, kind) for name, kind in _COLUMNS.items()
+        }
+        records = _core.las_records(
+            np.ascontiguousarray(chunk.points),
+            stored=[name for name in _EXTRA if name in point_format.dimension_names],
+            offsets=tuple(self._header.offsets.tolist()),
+            step=SCALE,
+            gps_origin=self._gps_origin,
+            intensity_scale=self._intensity_scale,
+            **columns,
+        )
+        table = records.view(point_format.dtype())
+        self._writer.write_points(laspy.PackedPointRecord(table, point_format))
 
     def _finish(self) -> None:
         self._writer.close()
@@ -118,16 +109,9 @@ def _header(first: MapChunk, crs_wkt: str | None) -> laspy.LasHeader:
     return header
 
 
-def _stored(name: str, values: NDArray[Any]) -> NDArray[Any]:
-    """Values as the file has them: angles in degrees, and no digits that mean nothing.
-
-    Such digits would be most of what a compressed point takes.
-    """
-    if name == "incidence":
-        return np.asarray(np.rint(np.degrees(values) * 8) / 8)
-    if name == "thickness":
-        return np.asarray(np.rint(values * 8192) / 8192)
-    return values
+def _column(chunk: MapChunk, name: str, kind: type[np.generic]) -> NDArray[Any] | None:
+    values = getattr(chunk, name)
+    return None if values is None else np.ascontiguousarray(values, kind)
 
 
 def _intensity_scale(first: MapChunk) -> float:

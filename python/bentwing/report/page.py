@@ -61,7 +61,7 @@ def write_report(
         _header(title, run_json),
         sections.verdict(run_json),
         sections.tiles(run_json, trajectory, points),
-        _maps(points, times, trajectory, run_json.get("windows") or []),
+        _maps(points, times, trajectory, run_json),
         merging_section(run_json.get("merging")),
         _georeference(run_json.get("georeference")),
         _coverage(points, times, run_json),
@@ -102,10 +102,13 @@ def _maps(
     points: NDArray[np.float64],
     times: NDArray[np.float64],
     trajectory: Trajectory,
-    windows: Sequence[Mapping[str, Any]],
+    record: Mapping[str, Any],
 ) -> str:
+    windows: Sequence[Mapping[str, Any]] = record.get("windows") or []
     if not len(points):
-        return '<h2>Map</h2><p class="none">No points were mapped.</p>'
+        is_wanted = (record.get("settings") or {}).get("writes_map", True)
+        why = "No points were mapped." if is_wanted else "No map was asked for."
+        return f'<h2>Map</h2><p class="none">{why}</p>'
     views = draw_views(points, times, trajectory, windows)
     seen = spans_sentence(degenerate_spans(windows))
     figures = [
@@ -143,8 +146,10 @@ def _accuracy(
     points: NDArray[np.float64], revisits: Revisits | None, record: Mapping[str, Any]
 ) -> str:
     """Show how well the map agrees with itself: what is known without any reference."""
+    title = "<h2>Accuracy, without a reference</h2>"
+    expected = _expected(record.get("expected_accuracy"))
     if not len(points):
-        return ""
+        return title + expected if expected else ""
     try:
         walls = wall_thickness(points)
     except ValueError:
@@ -154,13 +159,13 @@ def _accuracy(
     closing = closing_table(record.get("loop_closure"), asked=asked)
     loops = revisits_table(revisits, None if walls is None else walls.median)
     return (
-        f"<h2>Accuracy, without a reference</h2>{_expected(record.get('expected_accuracy'))}"
+        f"{title}{expected}"
         f'<div class="grid"><div>{numbers}</div>'
         f'<div>{closing}</div><div class="wide"><h3>Loops</h3>{loops}</div></div>'
     )
 
 
-def _expected(found: Mapping[str, float] | None) -> str:
+def _expected(found: Mapping[str, Any] | None) -> str:
     return f"<p>{escape(ExpectedAccuracy(**found).sentence())}</p>" if found else ""
 
 

@@ -8,7 +8,6 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from bentwing.base.progress import Progress
-from bentwing.closing.beams import find_beams
 
 if TYPE_CHECKING:
     from bentwing.closing.beams import FoundBeams
@@ -20,6 +19,8 @@ if TYPE_CHECKING:
 def find_in_run(job: Job, found: Found) -> FoundBeams | None:
     """Return by how much the beams are off, where that matters and the payload does not say it."""
     settings = job.settings
+    from bentwing.closing.beams import find_beams
+
     if settings.trust_payload or settings.payload.lidar.beams is not None:
         return None
     if found.estimate is None or found.failure is not None or found.doubt is not None:

@@ -7,8 +7,6 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from bentwing.base.errors import UsageError
-from bentwing.base.geodesy import ProjectedSystem
-from bentwing.closing.georeference.control_point_file import read_control_points
 from bentwing.run.head import Head
 
 if TYPE_CHECKING:
@@ -46,8 +44,12 @@ def opened(
 def require_coordinates(wanted: GeoreferenceSettings) -> None:
     """Refuse a system or a file of control points that cannot be used."""
     if wanted.epsg is not None:
+        from bentwing.base.geodesy import ProjectedSystem
+
         ProjectedSystem.of_epsg(wanted.epsg)
     if wanted.control_points is not None:
+        from bentwing.closing.georeference.control_point_file import read_control_points
+
         read_control_points(wanted.control_points)
 
 

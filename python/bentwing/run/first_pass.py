@@ -110,7 +110,7 @@ class FirstPass:
         """Return the verdict on the estimate so far if it is wrong and the head may be to blame."""
         if not self._may_stop or not len(batch.times):
             return None
-        verdict = self._judge.failure(float(batch.times[-1]), self._engine.current)
+        verdict = self._judge.failure(float(batch.times[-1]), lambda: self._engine.current)
         return verdict if verdict is not None and blames_head(verdict) else None
 
     def _so_far(self, error: BaseException | None = None) -> Estimate | None:

@@ -3,18 +3,17 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bentwing.base.errors import RecordingError
-from bentwing.calibrate.draft import draft_payload
 from bentwing.calibrate.inspection import judge
-from bentwing.calibrate.set_up import find_set_up
 from bentwing.recording import Payload, Recording
-from bentwing.recording.preprocess import RecordingPart
+from bentwing.recording.preprocess import KeptBatches, RecordingPart
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
     from types import TracebackType
 
     from typing_extensions import Self
@@ -56,7 +55,10 @@ class Head:
         self.settings = settings
         self.set_up: SetUp | None = None
         self._progress = progress
+        self._kept: KeptBatches | None = None
         if settings.payload == Payload.default():
+            from bentwing.calibrate.draft import draft_payload
+
             self._describe(draft_payload(self.paths).payload)
         self.recording = Recording(self.paths, self.settings.payload, strict=False)
 
@@ -75,7 +77,19 @@ class Head:
     def part(self) -> RecordingPart:
         """The part of the recording that the run uses."""
         settings = self.settings
-        return RecordingPart(self.recording, settings.payload, settings.start, settings.duration)
+        return RecordingPart(
+            self.recording, settings.payload, settings.start, settings.duration, self._kept
+        )
+
+    @contextmanager
+    def keeping(self, folder: Path) -> Iterator[None]:
+        """Decode the recording once: what its first whole pass yields is in a folder for the later ones."""
+        self._kept = KeptBatches(folder)
+        try:
+            yield
+        finally:
+            self._kept.close()
+            self._kept = None
 
     def require_fit(self) -> None:
         """Refuse what `bentwing info` calls unfit and no other set-up explains.
@@ -104,6 +118,8 @@ class Head:
 
     def found(self) -> SetUp:
         """Return the head as the recording shows it; takes some seconds, of a 2D lidar up to a minute."""
+        from bentwing.calibrate.set_up import find_set_up
+
         self._progress.note("looking for the set-up of the sensor head in the recording")
         settings = self.settings
         return find_set_up(
@@ -124,6 +140,8 @@ class Head:
     def _read_by(self, payload: Payload) -> None:
         self._describe(payload)
         self.recording.close()
+        if self._kept is not None:  # read by another payload
+            self._kept.close()
         self.recording = Recording(self.paths, payload, strict=False)
 
     @property

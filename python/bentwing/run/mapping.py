@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from contextlib import closing
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +18,7 @@ from bentwing.map.clean import clean
 from bentwing.map.sample import MapSample
 from bentwing.map.thin import thin
 from bentwing.map.writer import open_map
+from bentwing.recording.preprocess.read_ahead import read_ahead
 from bentwing.run.found import WrittenMap
 
 if TYPE_CHECKING:
@@ -33,6 +35,8 @@ if TYPE_CHECKING:
     from bentwing.run.found import Placed
     from bentwing.run.settings import MapSettings
 
+# Cleaned while those before them are compressed and written.
+_CHUNKS_AHEAD = 2
 _PAUSE = 10.0  # s between runs that are shown one after the other
 
 
@@ -81,7 +85,7 @@ def write_map(
     record: dict[str, Any] = {}
     chunks = clean(
         in_turn(sources, counts),
-        path,
+        folder.path,
         duration=duration,
         settings=settings.cleaning,
         counts=counts,
@@ -90,9 +94,12 @@ def write_map(
     )
     if difference is not None:
         chunks = difference.watch(chunks)
-    chunks = sample.watch(thin(chunks, settings.map_spacing, counts))
-    with _open(path, settings, origin_ns, placed) as writer:
-        for chunk in chunks:
+    kept = sample.watch(thin(chunks, settings.map_spacing, counts))
+    with (
+        closing(read_ahead(kept, _CHUNKS_AHEAD)) as ahead,
+        _open(path, settings, origin_ns, placed) as writer,
+    ):
+        for chunk in ahead:
             times = chunk.times + late[chunk.run_id] if late.any() else chunk.times
             writer.write(replace(chunk, points=_projected(chunk.points, placed), times=times))
     counts["map.written"] = writer.n_points

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 from bentwing import odometry
 from bentwing.base.progress import as_progress
-from bentwing.closing.localize import read_prior_map
 from bentwing.run import stages
 from bentwing.run.beams import read_by
 from bentwing.run.check import opened
@@ -47,6 +46,7 @@ def map_recording(
     cleaning: CleanSettings | None = None,
     georeferencing: GeoreferenceSettings | None = None,
     loop_closure: bool = True,
+    write_map: bool = True,
     prior_map: Path | str | None = None,
     settings: EstimatorSettings | Path | str | None = None,
     threads: int | None = None,
@@ -71,6 +71,7 @@ def map_recording(
     georeferencing : how GNSS fixes and control points are used; default: fixes, where the payload
         names their topic, as a rigid fit
     loop_closure : whether places seen again may correct the trajectory
+    write_map : whether there is a map; without one the run ends with its trajectory, much sooner
     prior_map : a run folder or a cloud in which the recording is localized: trajectory and map are
         then in its frame, and the points that have changed are written too
     settings : of the estimator, or a YAML file of what `bentwing map --print-settings` prints, all or
@@ -96,6 +97,7 @@ def map_recording(
         cleaning=cleaning,
         georeferencing=georeferencing,
         loop_closure=None if loop_closure else False,
+        writes_map=None if write_map else False,
         prior_map=prior_map,
         threads=threads,
         start=start,
@@ -134,6 +136,7 @@ def run_recording(
     with (
         opened(paths, settings, watch) as head,
         RunFolder(Path(out), settings.to_json(), resume=resume, inputs=map(Path, read)) as folder,
+        head.keeping(folder.path),
     ):
         folder.record.settings = head.settings.to_json()
         job = stages.Job(head.part, folder, head.settings, watch)
@@ -155,7 +158,8 @@ def run_recording(
                 found = _keep(job, stages.close(job, found))
                 checkpoint.save("loops", found)
             found = _keep(job, stages.place_on_earth(job, found))
-            found = _keep(job, stages.make_map(job, found))
+            last = stages.make_map if settings.writes_map else stages.leave_without_map
+            found = _keep(job, last(job, found))
             report_run(folder, found)
             checkpoint.discard()
     return replace(found, payload=head.settings.payload)
@@ -167,8 +171,11 @@ def _open_inputs(job: stages.Job, payload_file: Path | str | None) -> PriorMap |
     with folder.stage("inputs"):
         described = [] if payload_file is None else [Path(payload_file)]
         folder.add_inputs([*recording.paths, *described])
-        known = None if prior is None else read_prior_map(prior, job.settings.closing.surfels)
-        if known is not None:
+        known = None
+        if prior is not None:
+            from bentwing.closing.localize import read_prior_map
+
+            known = read_prior_map(prior, job.settings.closing.surfels)
             folder.add_inputs([known.file])
         folder.add_recordings(recording.paths, recording.clock.start_ns)
     return known

@@ -9,9 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bentwing.base.trajectory import Trajectory
-from bentwing.report.page import write_report
-from bentwing.report.picture import render_top, write_png
-from bentwing.report.views import overhead_points
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -51,6 +48,11 @@ def report_failure(folder: RunFolder, error: BaseException) -> None:
 def _write(
     folder: RunFolder, found: Found, trajectory: Trajectory | None, *, complete: bool
 ) -> None:
+    # behind all other stages, so that a run begins without them
+    from bentwing.report.page import write_report
+    from bentwing.report.picture import render_top, write_png
+    from bentwing.report.views import overhead_points
+
     if trajectory is None:
         trajectory = _NOWHERE if found.estimate is None else found.estimate.trajectory
     points, times = found.sample.points, found.sample.times

@@ -37,7 +37,7 @@ class Run:
     estimate : trajectory, calibration and diagnostics
     verdict : whether the result can be used, and why not
     warnings : sentences about the health of the result
-    map_path : the map
+    map_path : the map; None where none was asked for
     report_path : the report
     """
 
@@ -45,7 +45,7 @@ class Run:
     estimate: Estimate
     verdict: Verdict
     warnings: tuple[str, ...]
-    map_path: Path
+    map_path: Path | None
     report_path: Path
 
     @property
@@ -61,15 +61,15 @@ class Run:
     @classmethod
     def of(cls, out: Path, found: Found) -> Run:
         """Return the run whose stages have found this."""
-        if found.estimate is None or found.map is None:
-            msg = "found: expected the result of all stages, got one without estimate or map"
+        if found.estimate is None:
+            msg = "found: expected the result of all stages, got one without estimate"
             raise ValueError(msg)
         return cls(
             out,
             found.estimate,
             found.verdict,
             tuple(found.warnings),
-            found.map.path,
+            None if found.map is None else found.map.path,
             out / "report.html",
         )
 
@@ -89,13 +89,13 @@ class Run:
         folder = Path(out)
         record = require_single(folder, finished_record(folder))
         with understood(folder):
-            (written, *_) = (name for name in record["files"] if name.startswith("map."))
+            maps = [folder / name for name in record["files"] if name.startswith("map.")]
             return cls(
                 folder,
                 estimate_of(folder, record),
                 verdict_in(record),
                 tuple(record["warnings"]),
-                folder / written,
+                maps[0] if maps else None,
                 folder / "report.html",
             )
 

@@ -95,6 +95,9 @@ class RunSettings(MapSettings):
     """
 
     estimator: EstimatorName = Field(default="continuous", description="name of the estimator")
+    writes_map: bool = Field(
+        default=True, description="whether there is a map; false ends with the trajectory"
+    )
     loop_closure: GlobalSettings | Literal[False] = Field(
         default=GlobalSettings(),
         description="how loops are closed; false leaves the trajectory open-loop",

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""The stages of a run: each takes what was found so far and returns it with one thing more."""
+"""The stages of a run: each takes what was found so far and returns it with one thing more.
+
+A stage imports what it alone uses, so that a run begins before its last stage is loaded.
+"""
 
 from __future__ import annotations
 
@@ -9,22 +12,15 @@ from typing import TYPE_CHECKING
 
 from bentwing.base.errors import NotEnoughDataError
 from bentwing.base.progress import Progress
-from bentwing.closing.georeference.georeference import georeference
-from bentwing.closing.georeference.receivers import Receivers
-from bentwing.closing.global_registration import Budget, close_loops
-from bentwing.closing.joining.segments import close_segments
-from bentwing.closing.localize import Difference, NotInMapError, find_in_map
-from bentwing.evaluate.expected import expected_accuracy
 from bentwing.evaluate.verdict import judge_closing, judge_revisits
-from bentwing.map.project import project
-from bentwing.run.mapping import MapSource, write_map
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from bentwing.base.estimate import Estimate
     from bentwing.base.progress import Stage
-    from bentwing.closing.localize import PriorMap
+    from bentwing.closing.georeference.receivers import Receivers
+    from bentwing.closing.localize import Difference, PriorMap
     from bentwing.map.chunk import MapChunk
     from bentwing.recording.preprocess import RecordingPart
     from bentwing.run.folder import RunFolder
@@ -57,6 +53,8 @@ class Job:
 
 def close(job: Job, found: Found) -> Found:
     """Correct the trajectory by all that was seen more than once, or that a prior map shows."""
+    from bentwing.closing.global_registration import Budget, close_loops
+
     open_loop, part, threads = _known(found), job.part, job.settings.threads
     closing = job.settings.closing
     budget = Budget.of(part.length, closing)
@@ -69,6 +67,8 @@ def close(job: Job, found: Found) -> Found:
     with job.folder.stage("loops"), job.progress.stage("loops", part.length) as shown:
         batches = part.batches(shown, Counter())  # the first pass has counted what is dropped
         if len(open_loop.segments) > 1 and job.prior is None:
+            from bentwing.closing.joining.segments import close_segments
+
             closed, merging = close_segments(
                 open_loop,
                 batches,
@@ -99,6 +99,8 @@ def close(job: Job, found: Found) -> Found:
 
 
 def _localize(job: Job, found: Found, prior: PriorMap) -> Found:
+    from bentwing.closing.localize import NotInMapError, find_in_map
+
     part = job.part
     try:
         with job.folder.stage("localize"), job.progress.stage("localize", part.length) as shown:
@@ -116,6 +118,8 @@ def place_on_earth(job: Job, found: Found) -> Found:
         return replace(found, placed=job.prior.coordinates)
     if part.payload.gnss is None and settings.control_points is None:
         return found
+    from bentwing.closing.georeference.georeference import georeference
+
     with job.folder.stage("georeference"), Progress().stage("", part.length) as unseen:
         try:
             placed = georeference(
@@ -142,6 +146,8 @@ def place_on_earth(job: Job, found: Found) -> Found:
 
 def receivers_of(part: RecordingPart, name: str = "") -> Receivers | None:
     """Return the GNSS fixes of a part of a recording; None without any."""
+    from bentwing.closing.georeference.receivers import Receivers
+
     gnss = part.payload.gnss
     fixes = part.recording.fixes(part.start, part.duration)
     return None if gnss is None or fixes is None else Receivers.one(fixes, gnss.lever_arm, name)
@@ -149,8 +155,10 @@ def receivers_of(part: RecordingPart, name: str = "") -> Receivers | None:
 
 def make_map(job: Job, found: Found) -> Found:
     """Write the map, and what has changed since the prior map."""
-    estimate, prior, part = _known(found), job.prior, job.part
-    difference = None if prior is None else Difference(prior.cloud, estimate.trajectory)
+    from bentwing.evaluate.expected import expected_accuracy
+    from bentwing.run.mapping import MapSource, write_map
+
+    estimate, part = _known(found), job.part
     with job.folder.stage("map"), job.progress.stage("map", part.length) as shown:
         written = write_map(
             job.folder,
@@ -162,12 +170,30 @@ def make_map(job: Job, found: Found) -> Found:
             job.settings,
             duration=part.length,
             placed=found.placed,
-            difference=difference,
+            difference=_difference(job, estimate),
         )
     sigma = part.payload.lidar.range_sigma
     evidence = judge_revisits(written.revisits, sigma)
     accuracy = expected_accuracy(estimate, sigma, written.revisits)
     return replace(found, map=written, accuracy=accuracy, evidence=(*found.evidence, *evidence))
+
+
+def leave_without_map(job: Job, found: Found) -> Found:
+    """Say how accurate the trajectory is expected to be, where no map is asked for."""
+    from bentwing.evaluate.expected import expected_accuracy
+
+    accuracy = expected_accuracy(_known(found), job.part.payload.lidar.range_sigma)
+    if accuracy is not None:
+        accuracy = replace(accuracy, map_thickness=None)
+    return replace(found, accuracy=accuracy)
+
+
+def _difference(job: Job, estimate: Estimate) -> Difference | None:
+    if job.prior is None:
+        return None
+    from bentwing.closing.localize import Difference
+
+    return Difference(job.prior.cloud, estimate.trajectory)
 
 
 def _known(found: Found) -> Estimate:
@@ -180,6 +206,8 @@ def _known(found: Found) -> Estimate:
 def _chunks(
     job: Job, estimate: Estimate, shown: Stage, counts: dict[str, int]
 ) -> Iterator[MapChunk]:
+    from bentwing.map.project import project
+
     return project(
         job.part.batches(shown, Counter()),  # the first pass has counted what is dropped
         estimate.trajectory,

@@ -60,7 +60,7 @@ def recording(n=400_000, chunk=50_000, seed=1):
 def kept(chunks, tmp_path, counts=None, **settings):
     found = clean(
         iter(chunks),
-        tmp_path / "map.laz",
+        tmp_path,
         duration=DURATION,
         settings=CleanSettings(**settings),
         counts=counts,
@@ -117,7 +117,7 @@ def test_a_doubtful_return_in_the_open_is_removed_and_one_on_a_wall_stays(tmp_pa
 def test_the_result_is_the_same_with_any_number_of_threads(tmp_path, threads):
     chunks, _, _, _ = recording(n=100_000)
     reference = kept(chunks, tmp_path)
-    again = list(clean(iter(chunks), tmp_path / "m", duration=DURATION, threads=threads))
+    again = list(clean(iter(chunks), tmp_path, duration=DURATION, threads=threads))
     for a, b in zip(reference, again, strict=True):
         assert a.incidence.tobytes() == b.incidence.tobytes()
         assert a.thickness.tobytes() == b.thickness.tobytes()
@@ -163,7 +163,7 @@ def test_memory_does_not_grow_with_the_number_of_points(tmp_path):
     def peak(n):
         tracemalloc.start()
         stream = (chunks[i % len(chunks)] for i in range(n))
-        for _ in clean(stream, tmp_path / "map.laz", duration=DURATION):
+        for _ in clean(stream, tmp_path, duration=DURATION):
             pass
         most = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()

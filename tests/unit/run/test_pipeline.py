@@ -17,6 +17,7 @@ from bentwing.base.errors import EstimationError, UsageError
 from bentwing.base.estimate import Estimate
 from bentwing.base.progress import Progress
 from bentwing.base.trajectory import Trajectory, read_tum
+from bentwing.calibrate import set_up
 from bentwing.calibrate.inspection import Judgement
 from bentwing.calibrate.set_up import SetUp
 from bentwing.closing.global_registration import GlobalSettings
@@ -97,7 +98,7 @@ class FakeEstimator:
 def recording(tmp_path, monkeypatch):
     monkeypatch.setattr(head, "Recording", FakeRecording)
     monkeypatch.setattr(head, "judge", lambda *_, **__: Judgement([], [], None, 1.0))
-    monkeypatch.setattr(head, "find_set_up", lambda _, payload, *__, **___: SetUp(payload))
+    monkeypatch.setattr(set_up, "find_set_up", lambda _, payload, *__, **___: SetUp(payload))
     monkeypatch.setattr(odometry, "create", lambda *_: FakeEstimator(), raising=False)
     (tmp_path / "yard.mcap").write_bytes(b"recording")
     return [tmp_path / "yard.mcap"]
@@ -306,3 +307,43 @@ def test_the_settings_of_the_closing_are_those_that_are_used(tmp_path, recording
     record = record_of(tmp_path / "out")
     assert record["settings"]["loop_closure"]["memory_mb"] == 100.0
     assert record["loop_closure"]["budget"]["megabytes"] <= 100.0
+
+
+def test_without_a_map_the_run_ends_with_its_trajectory_and_says_so(tmp_path, recording):
+    whole = pipeline.map_recording(recording, PAYLOAD, tmp_path / "whole")
+    run = pipeline.map_recording(recording, PAYLOAD, tmp_path / "out", write_map=False)
+    names = {file.name for file in run.out.iterdir()}
+    assert names == {
+        "trajectory.txt",
+        "trajectory_covariance.txt",
+        "odometry.txt",
+        "report.html",
+        "run.json",
+    }
+    for name in ("trajectory.txt", "trajectory_covariance.txt", "odometry.txt"):
+        assert (run.out / name).read_bytes() == (whole.out / name).read_bytes()
+    record = record_of(run.out)
+    assert record["complete"] is True
+    assert record["map"] == {}
+    assert not any(name.startswith("map.") for name in record["counts"])
+    assert "map" not in record["timings"]
+    assert record["expected_accuracy"]["map_thickness"] is None
+    page = run.report_path.read_text()
+    assert "No map was asked for" in page
+    assert "Expected accuracy" in page
+    assert "surfaces in the map scatter" not in page
+    assert run.map_path is Run.load(run.out).map_path is None
+
+
+def test_a_recording_is_decoded_once_for_all_stages(tmp_path, recording, monkeypatch):
+    n_passes = []
+    decoded = FakeRecording.batches
+
+    def counted(*arguments, **options):
+        n_passes.append(arguments)
+        return decoded(*arguments, **options)
+
+    monkeypatch.setattr(FakeRecording, "batches", counted)
+    # its accelerations are zero, so that otherwise the head is looked for
+    pipeline.map_recording(recording, PAYLOAD, tmp_path / "out", trust_payload=True)
+    assert len(n_passes) == 1

@@ -6,9 +6,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from bentwing.base.voxels import centres_of, unpack
 from bentwing.calibrate.carrier.view import EDGE, NEAR
@@ -39,13 +36,14 @@ def carrier_cells(views: Sequence[View]) -> list[NDArray[np.int64]]:
     """
     keys, shares = _occupancy(views)
     keys, shares = keys[shares >= LIKELY], shares[shares >= LIKELY]
-    if not len(keys):
-        return []
     centres = centres_of(unpack(keys), EDGE)
     ranges = np.linalg.norm(centres, axis=1)
+    is_seed = (shares >= CERTAIN) & (ranges < REACH)
+    if not is_seed.any():
+        return []
     labels = _connected(centres, ranges)
     parts = []
-    for label in np.unique(labels[(shares >= CERTAIN) & (ranges < REACH)]):
+    for label in np.unique(labels[is_seed]):
         part = labels == label
         if ranges[part].max() < END:
             parts.append(keys[part])
@@ -73,6 +71,10 @@ def _occupancy(views: Sequence[View]) -> tuple[NDArray[np.int64], NDArray[np.flo
 
 def _connected(centres: NDArray[np.float64], ranges: NDArray[np.float64]) -> NDArray[np.int32]:
     """Return the number of the part (N,) to which each cell belongs."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
     pairs = cKDTree(centres).query_pairs(LINK + LINK_SHARE * NEAR, output_type="ndarray")
     first, second = pairs.T
     apart = np.linalg.norm(centres[first] - centres[second], axis=1)

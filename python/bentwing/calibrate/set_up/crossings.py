@@ -13,8 +13,6 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import minimize
-from scipy.spatial.transform import Rotation
 
 from bentwing.base import geometry
 from bentwing.calibrate.set_up.axes import angle_between
@@ -115,6 +113,9 @@ class Crossings:
     def _refined(
         self, R: NDArray[np.float64], reading: Reading
     ) -> tuple[float, NDArray[np.float64]]:
+        from scipy.optimize import minimize
+        from scipy.spatial.transform import Rotation
+
         def turned(vector: NDArray[np.float64]) -> NDArray[np.float64]:
             return np.asarray(Rotation.from_rotvec(vector).as_matrix() @ R)
 

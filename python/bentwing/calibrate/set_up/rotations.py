@@ -6,7 +6,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -17,6 +16,8 @@ _PSI = 1.533751168755204288118041
 
 def spread(n: int) -> NDArray[np.float64]:
     """Return n rotations (n, 3, 3), evenly spread over all there are."""
+    from scipy.spatial.transform import Rotation
+
     s = np.arange(n) + 0.5
     inner, outer = np.sqrt(s / n), np.sqrt(1.0 - s / n)
     a, b = 2 * np.pi * s / np.sqrt(2.0), 2 * np.pi * s / _PSI

@@ -3,7 +3,20 @@
 
 from __future__ import annotations
 
-from bentwing.closing.beams.find import find_beams
-from bentwing.closing.beams.found import FoundBeams
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from bentwing.closing.beams.find import find_beams
+    from bentwing.closing.beams.found import FoundBeams
+else:
+    from bentwing.base.lazy import lazy
+
+    __getattr__, __dir__ = lazy(
+        __name__,
+        {
+            "closing.beams.find": ["find_beams"],
+            "closing.beams.found": ["FoundBeams"],
+        },
+    )
 
 __all__ = ["FoundBeams", "find_beams"]

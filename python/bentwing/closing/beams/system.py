@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import linalg, sparse
 
 from bentwing.base.value import Value
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+    from scipy import sparse
 
     from bentwing.closing.beams.cells import Cells
     from bentwing.closing.beams.shots import Shots
@@ -91,6 +91,8 @@ def solve(shots: Shots, cells: Cells, beams: Array, sigmas: Array, range_sigma: 
 
 def _solved(H: Array, g: Array, n_poses: int) -> tuple[Array, Array, Array]:
     """Return poses and beams that solve `H x = -g`, and the covariance of the beams."""
+    from scipy import linalg
+
     of_poses, mixed = H[:n_poses, :n_poses], H[:n_poses, n_poses:]
     factor = linalg.cho_factor(of_poses, lower=True)
     known = linalg.cho_solve(factor, np.column_stack([mixed, g[:n_poses]]))
@@ -106,6 +108,8 @@ def _rows(shots: Shots, cells: Cells, n_beams: int) -> tuple[sparse.csr_matrix, 
     Those by the beams are taken where the return would be in the plane. Taken where it is they would
     hold its noise, and all would agree that a flatter world has less of it.
     """
+    from scipy import sparse
+
     before, shares, n_knots = knots_of(shots.times)
     n, at = cells.normals, cells.chosen
     rise, turn, ray, up = (slope[at] for slope in shots.slopes())
@@ -137,6 +141,8 @@ def _rows(shots: Shots, cells: Cells, n_beams: int) -> tuple[sparse.csr_matrix, 
 
 def _without_planes(rows: sparse.csr_matrix, weights: Array, cells: Cells) -> tuple[Array, Array]:
     """Return the normal equations of poses and beams, height and slopes of each plane eliminated."""
+    from scipy import sparse
+
     n = len(weights)
     planes = np.column_stack([np.ones(n), cells.along])
     columns = 3 * cells.cells[:, None] + np.arange(3)

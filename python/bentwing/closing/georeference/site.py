@@ -11,7 +11,6 @@ import numpy as np
 from bentwing.base import geometry
 from bentwing.base.errors import NotEnoughDataError, UsageError
 from bentwing.base.geodesy import LevelFrame, ProjectedSystem
-from bentwing.closing.georeference.bend import bend, of_fixes, of_surfaces
 from bentwing.closing.georeference.placement import (
     Placement,
     Positions,
@@ -189,6 +188,9 @@ class Site:
         marks: Marks | None,
     ) -> Trajectory:
         """Let a trajectory give way to the fixes and the control points."""
+        # slow to import, so only when it is needed
+        from bentwing.closing.georeference.bend import bend, of_fixes, of_surfaces
+
         observations = []
         if self.receivers is not None and used.any():
             antenna, levers = self.antenna(trajectory)

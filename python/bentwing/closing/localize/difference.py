@@ -6,7 +6,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from bentwing.base.voxels import VoxelSet, pack, unpack, voxel_keys
 from bentwing.closing.places import FreeSpace, positions_at, seen_through
@@ -154,6 +153,8 @@ class Difference:
 
 def _not_alone(points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return those of points (N, 3) that have some others around them."""
+    from scipy.spatial import cKDTree
+
     if not len(points):
         return points
     tree = cKDTree(points)

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial.distance import cdist
 
 from bentwing.base.transform import apply, upright
 from bentwing.closing.places.gestalt import opposite
@@ -78,6 +77,8 @@ def hypotheses(a: Place, b: Place, metric: Metric, n: int) -> list[Hypothesis]:
 
 def _matches(a: Place, b: Place, metric: Metric) -> _Matches:
     """Find the keypoints of b most like each of a's, for both signs of the frames."""
+    from scipy.spatial.distance import cdist
+
     theirs = metric.apply(b.descriptors)
     ours = np.concatenate([metric.apply(a.descriptors), metric.apply(opposite(a.descriptors))])
     n = len(a.keypoints)

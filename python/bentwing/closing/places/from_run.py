@@ -74,7 +74,7 @@ def map_of_run(folder: Path) -> RunMap:
     begin = segments[0][0] if segments else 0.0
     path = next((p for s in MAP_SUFFIXES if (p := folder / f"map{s}").exists()), None)
     if path is None:
-        msg = f"{folder}: the run has no map; run `bentwing map` again, to its end"
+        msg = f"{folder}: the run has no map; run `bentwing map` again, to its end and without --no-map"
         raise UsageError(msg)
     absolute, first_ns = read_tum(folder / "trajectory.txt")
     trajectory = Trajectory(absolute.times + begin, absolute.positions, absolute.quats_xyzw)

@@ -6,7 +6,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -63,6 +62,8 @@ def _neighbourhoods(
     cloud: NDArray[np.float64], centres: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Whose neighbour each found point is, and its offset from there."""
+    from scipy.spatial import cKDTree
+
     found = cKDTree(centres[:, :2]).sparse_distance_matrix(
         cKDTree(cloud[:, :2]), RADIUS, output_type="ndarray"
     )

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from bentwing.closing.places.cloud import surfels_from
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+    from scipy.spatial import cKDTree
 
 _REACH = 1.0  # m, of the neighbourhood that gives normal and planarity
 _NEIGHBOURS = 24  # of it at most
@@ -48,6 +48,8 @@ def draw_keypoints(cloud: NDArray[np.float64], n: int) -> Keypoints:
     ----------
     Bosse and Zlot 2013; Kaul 2015, section 2.2.
     """
+    from scipy.spatial import cKDTree
+
     order = np.random.default_rng(_SEED).permutation(len(cloud))
     tree = cKDTree(cloud)
     found: list[Keypoints] = []

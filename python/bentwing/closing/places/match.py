@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from bentwing.base.log import get_logger
 from bentwing.closing.places.consensus import Hypothesis, hypotheses
@@ -21,6 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
+    from scipy.spatial import cKDTree
 
     from bentwing.closing.places.place import Place
 
@@ -84,6 +84,8 @@ def match_places(
     ----------
     Kaul 2015, section 2.2; Bosse and Zlot 2013.
     """
+    from scipy.spatial import cKDTree
+
     settings, metric = settings or MatchSettings(), metric or default_metric()
     votes = vote(a, b, metric, settings.n_neighbours)
     likely = likely_pairs(votes, settings.min_votes, settings.max_candidates)

@@ -9,7 +9,6 @@ from importlib import resources
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg import eigh
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -69,6 +68,8 @@ def learn_metric(
     ----------
     Bosse and Zlot 2009, Keypoint design and evaluation for place recognition.
     """
+    from scipy.linalg import eigh
+
     size = matching.shape[1]
     if min(len(matching), len(others)) < size:
         msg = f"{len(matching)} matching and {len(others)} other pairs cannot teach {size} values"

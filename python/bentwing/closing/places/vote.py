@@ -6,7 +6,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from bentwing.closing.places.gestalt import opposite
 
@@ -27,6 +26,8 @@ def vote(
     Each descriptor of ours votes for the places of its nearest neighbours among all of theirs; a
     vote is worth 1 at no distance and 0 at the metric's reach and beyond.
     """
+    from scipy.spatial import cKDTree
+
     votes = np.zeros((len(ours), len(theirs)))
     counts = [len(place.keypoints) for place in theirs]
     if not sum(counts):

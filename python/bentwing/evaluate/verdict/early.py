@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 from bentwing.evaluate.verdict.judge import judge_so_far
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from bentwing.evaluate.verdict.verdict import Verdict
     from bentwing.evaluate.verdict.watch import Watch
     from bentwing.odometry.interface import Snapshot
@@ -36,18 +38,20 @@ class EarlyJudge:
         """Whether an estimate of samples up to `newest`, s, is still judged."""
         return self._first is None or newest < self._first + _UNTIL
 
-    def failure(self, newest: float, now: Snapshot | None) -> Verdict | None:
+    def failure(self, newest: float, current: Callable[[], Snapshot | None]) -> Verdict | None:
         """Return the verdict on what is known now if it is that all is wrong.
 
         Parameters
         ----------
         newest : s, stamp of the newest sample
+        current : returns what is known, which takes longer than most batches
         """
         if self._first is None:
             self._first = self._judged = newest
         if newest < self._judged + _INTERVAL or not self.is_young(newest):
             return None
         self._judged = newest
+        now = current()
         estimate = None if now is None else now.estimate()
         verdict = judge_so_far(estimate, self._payload, self._watch)
         return verdict if verdict.state == "failed" else None

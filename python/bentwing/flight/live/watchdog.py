@@ -11,6 +11,8 @@ from bentwing.base.errors import DivergedError
 from bentwing.evaluate.verdict import EarlyJudge, Watch
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from bentwing.odometry.interface import Snapshot
     from bentwing.recording.batches import Batch
     from bentwing.recording.payload import Payload
@@ -37,15 +39,21 @@ class Watchdog:
         if self._judge.is_young(self._newest):
             self._watch.add(batch)
 
-    def require_health(self, now: Snapshot | None) -> None:
+    def require_health(self, current: Callable[[], Snapshot | None]) -> None:
         """Judge what is known by now, every two seconds.
+
+        Parameters
+        ----------
+        current : as of `EarlyJudge.failure`
 
         Raises
         ------
         DivergedError
             If the estimate is certainly wrong.
         """
-        verdict = self._judge.failure(self._newest, now) if np.isfinite(self._newest) else None
+        if not np.isfinite(self._newest):
+            return
+        verdict = self._judge.failure(self._newest, current)
         if verdict is not None:
             main = verdict.reasons[0]
             msg = f"the estimate is wrong: {main.sentence}; {main.advice}"

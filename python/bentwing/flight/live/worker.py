@@ -145,7 +145,7 @@ class Worker:
                 self._engine.take(usable)
 
     def _register(self, *, finishing: bool = False) -> None:
-        self._watchdog.require_health(self._engine.current)
+        self._watchdog.require_health(lambda: self._engine.current)
         if not finishing and self._is_waiting and not self._search():
             return
         while not self._stopping and self._engine.advance(finishing=finishing):

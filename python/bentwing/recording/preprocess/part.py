@@ -11,10 +11,11 @@ from bentwing.recording.preprocess.read_ahead import read_ahead
 
 if TYPE_CHECKING:
     from collections import Counter
-    from collections.abc import Iterator
+    from collections.abc import Generator, Iterator
 
     from bentwing.base.progress import Stage
     from bentwing.recording import Batch, Payload, Recording
+    from bentwing.recording.preprocess.kept import KeptBatches
 
 # A few seconds of a lidar: reading goes on while a window is registered.
 BATCHES_AHEAD = 32
@@ -27,12 +28,14 @@ class RecordingPart:
     Attributes
     ----------
     start, duration : s, None for the beginning and for everything after it
+    kept : where the first whole pass is kept for the later ones; None decodes in each
     """
 
     recording: Recording
     payload: Payload
     start: float | None = None
     duration: float | None = None
+    kept: KeptBatches | None = None
 
     @property
     def length(self) -> float:
@@ -49,9 +52,15 @@ class RecordingPart:
         counts : receives what is dropped, see `preprocess`
         """
         reached = self.start or 0.0
-        stream = self.recording.batches(self.start, self.duration)
-        for batch in read_ahead(preprocess(stream, self.payload, counts), BATCHES_AHEAD):
+        for batch in read_ahead(self._stream(counts), BATCHES_AHEAD):
             yield batch
             if len(batch.times) and batch.times[-1] > reached:
                 shown.advance(float(batch.times[-1]) - reached)
                 reached = float(batch.times[-1])
+
+    def _stream(self, counts: Counter[str]) -> Generator[Batch, None, None]:
+        if self.kept is not None and self.kept.is_whole:
+            return self.kept.again(counts)
+        decoded = self.recording.batches(self.start, self.duration)
+        usable = preprocess(decoded, self.payload, counts)
+        return usable if self.kept is None else self.kept.keeping(usable, counts)

@@ -8,7 +8,7 @@ from threading import Event, Thread
 from typing import TYPE_CHECKING, Generic, TypeVar
 
 if TYPE_CHECKING:
-    from collections.abc import Generator, Iterator
+    from collections.abc import Generator
 
 _Item = TypeVar("_Item")
 
@@ -16,7 +16,7 @@ _Item = TypeVar("_Item")
 _PATIENCE = 0.1
 
 
-def read_ahead(items: Generator[_Item, None, None], most: int) -> Iterator[_Item]:
+def read_ahead(items: Generator[_Item, None, None], most: int) -> Generator[_Item, None, None]:
     """Pass on what another thread takes from `items`, in its order, at most `most` of them ahead.
 
     What `items` raises is raised here, behind the items before it. When the consumer stops, the

@@ -66,7 +66,9 @@ def read_pictured(run: Path, most: int = _MOST) -> Pictured:
     record = finished_record(run)
     path = map_of(run)
     if path is None:
-        msg = f"{run}: the run has no map; run `bentwing map` again, to its end"
+        msg = (
+            f"{run}: the run has no map; run `bentwing map` again, to its end and without --no-map"
+        )
         raise InputError(msg)
     trajectory, origin_ns = trajectory_of(run / "trajectory.txt", record)
     begin = adjusted_gps_origin(origin_ns) if path.suffix in {".laz", ".las"} else 0.0

@@ -75,5 +75,5 @@ def test_columns_that_do_not_fit_together_are_refused(changes, sentence):
 
 def test_responses_of_another_shape_are_refused():
     still = np.tile([0.0, 0.0, 0.0, 1.0], (2, 1))
-    with pytest.raises(ValueError, match=r"responses: expected a C-contiguous array \(K, 6, 45\)"):
+    with pytest.raises(ValueError, match=r"responses: expected a C-contiguous array \(K, 6, 47\)"):
         _core.Samples(0.0, 0.01, np.zeros((2, 3)), still, np.zeros((2, 5, N_STATES)))

@@ -87,6 +87,7 @@ fn globals() -> Globals {
             T_imu_base: Isometry3::new(Vector3::new(0.05, 0.0, -0.1), Vector3::new(0.0, 1.5, 0.1)),
             clock: LidarClock::late_by(0.002),
             motor: None,
+            ranges: bentwing_trajectory::RangeBias::default(),
         },
         unit: InertialUnit::ideal(),
         gravity: Vector3::z() * 9.8,

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     Stated = Mapping[str, Sequence[float]]
 
-N_STATES = 45
+N_STATES = 47
 # Order of the core's `registration::index`.
 SLICES = {
     "latency": slice(0, 1),
@@ -31,22 +31,26 @@ SLICES = {
     "encoder_zero": slice(8, 9),
     "motor_tilt": slice(9, 11),
     "motor_offset": slice(11, 13),
-    "gyro_bias": slice(13, 16),
-    "accel_bias": slice(16, 19),
-    "gravity": slice(19, 21),
-    "gyro_scale": slice(21, 24),
-    "gyro_misalignment": slice(24, 27),
-    "g_sensitivity": slice(27, 36),
-    "accel_scale": slice(36, 39),
-    "accel_misalignment": slice(39, 45),
+    "range_offset": slice(13, 14),
+    "range_grazing": slice(14, 15),
+    "gyro_bias": slice(15, 18),
+    "accel_bias": slice(18, 21),
+    "gravity": slice(21, 23),
+    "gyro_scale": slice(23, 26),
+    "gyro_misalignment": slice(26, 29),
+    "g_sensitivity": slice(29, 38),
+    "accel_scale": slice(38, 41),
+    "accel_misalignment": slice(41, 47),
 }
 UNIT_STATES = (
     "gyro_scale", "gyro_misalignment", "g_sensitivity", "accel_scale", "accel_misalignment",
 )  # fmt: skip
 MOTOR_STATES = ("encoder_zero", "motor_tilt", "motor_offset")
+RANGE_STATES = ("range_offset", "range_grazing")
 
 # Standard deviations before anything was measured: s, rad, m, rad/s, m/s², rad, rad, rad, m, s/s. Two
 # crystals are up to 20 ppm off each. Where little shows the rate, no more of it should be believed.
+# Rangefinders are right to ± 10 to 30 mm, and echoes late by a tenth to a third of a beam of 3 mrad.
 INITIAL_STD = {
     "latency": 3e-3,
     "extrinsic_rotation": 9e-3,
@@ -58,6 +62,8 @@ INITIAL_STD = {
     "motor_tilt": 9e-3,
     "motor_offset": 3e-3,
     "latency_rate": 2e-5,
+    "range_offset": 4e-3,
+    "range_grazing": 1e-4,
 }
 # States of which a payload may state that they are less certain.
 DESCRIBED = ("latency", "extrinsic_rotation", "extrinsic_translation")
@@ -133,12 +139,12 @@ class SlowStatePrior:
 
     @property
     def information(self) -> NDArray[np.float64]:
-        """(45, 45) information about the prior's mean."""
+        """(47, 47) information about the prior's mean."""
         return self._information
 
     @property
     def offset(self) -> list[float]:
-        """Correction (45,) that leads from the prior's mean to the current values."""
+        """Correction (47,) that leads from the prior's mean to the current values."""
         return self._offset.tolist()
 
     def reset(self, name: str, std: float | NDArray[np.float64]) -> None:
@@ -177,7 +183,7 @@ class SlowStatePrior:
         self._offset[:] = np.linalg.solve(self._information, before @ self._offset)
 
     def discounted(self, covariance: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the covariance (45, 45) after a window as it is if matches depend on each other."""
+        """Return the covariance (47, 47) after a window as it is if matches depend on each other."""
         active = ~self.frozen
         honest = np.zeros_like(covariance)
         if active.any():
@@ -197,8 +203,8 @@ class SlowStatePrior:
 
         Parameters
         ----------
-        covariance : (45, 45) of the slow states after the window, prior included
-        offset : (45,) correction that leads from the prior's mean to the window's estimate
+        covariance : (47, 47) of the slow states after the window, prior included
+        offset : (47,) correction that leads from the prior's mean to the window's estimate
         shift, window : s
         """
         active = ~self.frozen
@@ -236,7 +242,7 @@ def _with_unit(std: Mapping[str, float], errors: Mapping[str, float]) -> dict[st
 
 
 def at_epoch(covariance: NDArray[np.float64], later: float) -> NDArray[np.float64]:
-    """Return the covariance (45, 45) with the latency at an epoch so much later, s."""
+    """Return the covariance (47, 47) with the latency at an epoch so much later, s."""
     change = np.eye(N_STATES)
     change[SLICES["latency"], SLICES["latency_rate"]] = later
     return np.asarray(change @ covariance @ change.T)

@@ -576,6 +576,7 @@ class Piece:
     information : (47, 47) float64 about the prior's mean of the slow states
     offset : (47,) correction that leads from that mean to `globals`
     frozen : (47) slow states that are not estimated
+    optional : (47) those that stay as they are unless the recording shows that they are others
     shown_noise : times, s, and how large the noise of gyro and accelerometer shows itself then, as
         standard deviations over the stated ones; without any as stated. Weights stay as stated.
     """
@@ -590,6 +591,7 @@ class Piece:
         information: NDArray[np.float64],
         offset: Sequence[float],
         frozen: Sequence[bool],
+        optional: Sequence[bool],
         shown_noise: tuple[list[float], list[tuple[float, float]]],
     ) -> Piece: ...
 

@@ -135,8 +135,8 @@ def _prior(beginning: Beginning, payload: Payload, before: OdometryPass | None) 
         payload.imu if beginning.has_imu else None,
         has_motor=payload.encoder is not None,
         moving=moving,
-        # Behind a start in motion they would take up whatever is wrong with the first seconds.
-        frozen=(*beginning.settings.frozen, *(RANGE_STATES if moving else ())),
+        # Few seconds say too little of them; see the global registration.
+        frozen=(*beginning.settings.frozen, *RANGE_STATES),
         stated={} if payload.calibration is None else payload.calibration.std,
     )
     if static is not None:

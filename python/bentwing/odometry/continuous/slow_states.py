@@ -62,8 +62,8 @@ INITIAL_STD = {
     "motor_tilt": 9e-3,
     "motor_offset": 3e-3,
     "latency_rate": 2e-5,
-    "range_offset": 4e-3,
-    "range_grazing": 1e-4,
+    "range_offset": 0.02,
+    "range_grazing": 7e-4,
 }
 # States of which a payload may state that they are less certain.
 DESCRIBED = ("latency", "extrinsic_rotation", "extrinsic_translation")
@@ -125,14 +125,13 @@ class SlowStatePrior:
             std |= _with_unit(std, imu.errors_expected)
         frozen = {*frozen, *(name for name in UNIT_STATES if std[name] == 0.0)}
         names = _frozen_names(frozen, has_imu=imu is not None, has_motor=has_motor)
-        self.frozen = np.zeros(N_STATES, dtype=bool)
         self._information = np.zeros((N_STATES, N_STATES))
         self._offset = np.zeros(N_STATES)
         self._walk = np.zeros(N_STATES)
         walk = WALK if imu is None else WALK | {"gyro_bias": imu.gyro_walk_expected}
+        self.frozen = places_of(names)
         for name, place in SLICES.items():
             index = np.arange(N_STATES)[place]
-            self.frozen[place] = name in names
             # What is known exactly is frozen: any number keeps the matrix regular.
             self._information[index, index] = (std[name] or 1.0) ** -2
             self._walk[place] = walk.get(name, 0.0) ** 2
@@ -254,6 +253,14 @@ def named_std(covariance: NDArray[np.float64], frozen: NDArray[np.bool_]) -> dic
     for name in UNIT_STATES:
         std[SLICES[name]] *= REPEATED
     return {name: std[s].tolist() for name, s in SLICES.items() if not frozen[s].all()}
+
+
+def places_of(names: Iterable[str]) -> NDArray[np.bool_]:
+    """Return which entries (47,) are those of the states with these names."""
+    chosen = np.zeros(N_STATES, dtype=bool)
+    for name in names:
+        chosen[SLICES[name]] = True
+    return chosen
 
 
 def _frozen_names(frozen: Iterable[str], *, has_imu: bool, has_motor: bool) -> set[str]:

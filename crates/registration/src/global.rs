@@ -36,7 +36,7 @@ pub fn register_globally(
     let states: Vec<State<'_>> = states.collect();
     let mut rounds = Rounds {
         problem,
-        settings,
+        settings: settings.clone(),
         joint: Joint::new(&states),
         gatherer: Gatherer::new(problem, &states, settings),
         states,
@@ -78,16 +78,19 @@ pub fn register_globally(
 /// What the iterations of a registration work with.
 struct Rounds<'a> {
     problem: &'a GlobalProblem<'a>,
-    settings: &'a Settings,
+    settings: Settings,
     joint: Joint,
     gatherer: Gatherer,
     states: Vec<State<'a>>,
     iterations: Vec<Iteration>,
 }
 
+/// The last equations of some iterations, and whether nothing moved any more.
+type Settled = (Factorized, bool);
+
 impl Rounds<'_> {
-    /// Iterates until nothing moves any more; returns the last equations, and whether it came to that.
-    fn settle(&mut self, mut step_size: StepSize) -> Result<(Factorized, bool), SolveError> {
+    /// Iterates until nothing moves any more, or as often as it is allowed to.
+    fn settle(&mut self, mut step_size: StepSize) -> Result<Settled, SolveError> {
         let mut solver = Solver::default();
         let last = self.iterations.len() + self.settings.max_outer;
         loop {
@@ -107,7 +110,7 @@ impl Rounds<'_> {
                 n_far,
                 step: step_size,
             });
-            let converged = step_size.converged(self.settings);
+            let converged = step_size.converged(&self.settings);
             if converged || self.iterations.len() >= last {
                 return Ok((factorized, converged));
             }
@@ -115,15 +118,9 @@ impl Rounds<'_> {
     }
 
     /// Goes on with those of the optional states that show, unless it does not settle with them.
-    fn with_what_shows(
-        &mut self,
-        settled: (Factorized, bool),
-    ) -> Result<(Factorized, bool), SolveError> {
-        let is_asked = self
-            .problem
-            .pieces
-            .iter()
-            .any(|p| p.optional.contains(&true));
+    fn with_what_shows(&mut self, settled: Settled) -> Result<Settled, SolveError> {
+        let mut pieces = self.problem.pieces.iter();
+        let is_asked = pieces.any(|p| p.optional.contains(&true));
         if !is_asked || !settled.1 {
             return Ok(settled);
         }
@@ -132,14 +129,26 @@ impl Rounds<'_> {
         if !shown::release(equations, &self.joint, &mut self.states)? {
             return Ok(settled);
         }
+        // What is wrong with them has moved the poses as fast as the windows could follow.
+        let interval = self.settings.knot_interval;
+        self.use_knots(self.problem.plan.posterior_interval.min(interval));
         let found = self.settle(StepSize::NONE)?;
         if found.1 {
             return Ok(found);
         }
         self.states = without;
+        self.use_knots(interval);
         self.iterations.truncate(n_before);
         self.gatherer.match_again();
         Ok(settled)
+    }
+
+    /// Takes the states as they are with knots at another interval, s.
+    fn use_knots(&mut self, interval: f64) {
+        self.settings.knot_interval = interval;
+        let states = self.states.iter().map(|s| s.with_knots(interval));
+        self.states = states.collect();
+        self.joint = Joint::new(&self.states);
     }
 
     /// All rows at the present states, how the matches fit, and how many are far ones.
@@ -147,7 +156,7 @@ impl Rounds<'_> {
         let mut equations = NormalEquations::new(self.joint.n_controls());
         let pieces = self.states.iter_mut().zip(&self.problem.pieces);
         for (number, (state, piece)) in pieces.enumerate() {
-            let rows = state.fixed_rows(Some(piece.first_pose(number == 0)), self.settings);
+            let rows = state.fixed_rows(Some(piece.first_pose(number == 0)), &self.settings);
             self.joint.add_piece(&mut equations, number, &rows);
         }
         let scale = self.settings.cauchy_scale_at(self.iterations.len());

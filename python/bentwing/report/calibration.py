@@ -66,13 +66,12 @@ def _unit_rows(unit: InertialUnit, std: Mapping[str, list[float]]) -> list[tuple
 
 
 def _range_rows(ranges: RangeBias, std: Mapping[str, list[float]]) -> list[tuple[str, str, str]]:
-    """Make the rows of what is wrong with the ranges, if it was estimated."""
-    if "range_offset" not in std:
-        return []
-    return [
-        _row("ranges too long, mm", [ranges.offset], std["range_offset"], 1e3, 1),
-        _row("the same under 45°, mm per m", [ranges.grazing], std["range_grazing"], 1e3, 2),
+    """Make the rows of what is wrong with the ranges: of what was found or described."""
+    rows = [
+        ("ranges too long, mm", ranges.offset, std.get("range_offset"), 1),
+        ("the same under 45°, mm per m", ranges.grazing, std.get("range_grazing"), 2),
     ]
+    return [_row(name, [value], known, 1e3, n) for name, value, known, n in rows if known or value]
 
 
 def _rate_row(found: Calibration, std: Sequence[float] | None) -> list[tuple[str, str, str]]:

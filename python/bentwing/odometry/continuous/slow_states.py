@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -221,7 +221,7 @@ class SlowStatePrior:
         self._offset[active] = estimate - np.linalg.solve(after, pull)
 
     def _gained(
-        self, covariance: NDArray[np.float64], block: tuple[NDArray[np.intp], ...]
+        self, covariance: NDArray[np.float64], block: tuple[NDArray[Any], ...]
     ) -> NDArray[np.float64]:
         """Information of a window without that of its prior."""
         return _positive_part(np.linalg.inv(covariance[block]) - self._information[block])

@@ -267,6 +267,7 @@ class Globals:
     motor_axis : (3,) motor frame; only for motor-turned lidars, with `T_motor_lidar`
     encoder_zero : rad, added to every encoder angle
     T_motor_lidar : pose of the lidar in the rotating motor frame
+    ranges : (2,) by how much ranges are too long, see `ranges`
     """
 
     def __new__(
@@ -283,6 +284,7 @@ class Globals:
         T_motor_lidar: _Transform | None = None,
         latency_rate: float = 0.0,
         latency_epoch: float = 0.0,
+        ranges: Sequence[float] = ...,
     ) -> Globals: ...
     def __getnewargs_ex__(self) -> tuple[tuple[_Transform], dict[str, Any]]: ...
     @property
@@ -321,6 +323,10 @@ class Globals:
         """`gyro`, `g_sensitivity` and `accel` by rows, `reference` and `main_axis` of an `InertialUnit`."""
 
     @property
+    def ranges(self) -> list[float]:
+        """By how much ranges are too long (2,): m, and per `r tan θ`, rad."""
+
+    @property
     def gravity(self) -> NDArray[np.float64]:
         """Gravity (3,), m/s², map frame, pointing up."""
 
@@ -337,7 +343,7 @@ class Globals:
         """Rotation (4,) of the lidar in the rotating motor frame; None without a motor."""
 
     def moved_from(self, earlier: Globals) -> list[float]:
-        """Return the correction (45,) that leads from `earlier` to these."""
+        """Return the correction (47,) that leads from `earlier` to these."""
 
     def levelled(self) -> Globals:
         """Return the same states with gravity straight up."""
@@ -352,7 +358,7 @@ class Samples:
     dt : s, interval of the samples
     positions : (N, 3) float64, m, map frame, at least two
     quats_xyzw : (N, 4) float64, unit
-    responses : (K, 6, 45) float64, how the first K follow the slow states, see `responses_at`
+    responses : (K, 6, 47) float64, how the first K follow the slow states, see `responses_at`
     """
 
     def __new__(
@@ -390,10 +396,10 @@ class Samples:
         """Return these samples with those from `first` on replaced by `newer`."""
 
     def following(self, correction: Sequence[float]) -> Samples:
-        """Return these samples where a correction (45,) of the slow states moves them."""
+        """Return these samples where a correction (47,) of the slow states moves them."""
 
     def responses_at(self, samples: Sequence[int]) -> NDArray[np.float64]:
-        """How samples follow the slow states (K, 6, 45): `[δr, δt]`, rad and m, map frame, by each."""
+        """How samples follow the slow states (K, 6, 47): `[δr, δt]`, rad and m, map frame, by each."""
 
     def extended(self, imu: Imu | None, globals: Globals, until: float) -> tuple[Samples, int]:
         """Extend by the IMU, or at constant velocity without one.
@@ -523,7 +529,7 @@ class Registration:
 
     @property
     def covariance(self) -> NDArray[np.float64]:
-        """Covariance (45, 45) of the slow states; zero where frozen."""
+        """Covariance (47, 47) of the slow states; zero where frozen."""
 
     def sample_covariances(self) -> NDArray[np.float64]:
         """Compute the covariances (N, 6, 6) of the correction of each sample, rotation first.
@@ -536,7 +542,7 @@ class Registration:
 
     @property
     def offset(self) -> list[float]:
-        """Correction (45,) that leads from the prior's mean to `globals`."""
+        """Correction (47,) that leads from the prior's mean to `globals`."""
 
     @property
     def n_surfels(self) -> int:
@@ -607,9 +613,10 @@ class Piece:
     samples : trajectory to start from
     surfels : of consecutive stretches of some seconds, in order of time
     imu : its inertial samples, less the history of their biases; None for a lidar alone
-    information : (45, 45) float64 about the prior's mean of the slow states
-    offset : (45,) correction that leads from that mean to `globals`
-    frozen : (45) slow states that are not estimated
+    information : (47, 47) float64 about the prior's mean of the slow states
+    offset : (47,) correction that leads from that mean to `globals`
+    frozen : (47) slow states that are not estimated
+    optional : (47) those that stay as they are unless the recording shows that they are others
     shown_noise : times, s, and how large the noise of gyro and accelerometer shows itself then, as
         standard deviations over the stated ones; without any as stated. Weights stay as stated.
     """
@@ -624,6 +631,7 @@ class Piece:
         information: NDArray[np.float64],
         offset: Sequence[float],
         frozen: Sequence[bool],
+        optional: Sequence[bool],
         shown_noise: tuple[list[float], list[tuple[float, float]]],
     ) -> Piece: ...
 
@@ -641,7 +649,7 @@ class GlobalRegistration:
 
     @property
     def covariances(self) -> list[NDArray[np.float64]]:
-        """Covariances (45, 45) of the slow states; zero where frozen."""
+        """Covariances (47, 47) of the slow states; zero where frozen."""
 
     @property
     def iterations(self) -> list[tuple[int, int, float, float, float, float]]:
@@ -721,9 +729,9 @@ def register_window(
 
     Parameters
     ----------
-    information : (45, 45) float64 about the prior's mean of the slow states
-    offset : (45,) correction that leads from that mean to `globals`
-    frozen : (45) slow states that are not estimated
+    information : (47, 47) float64 about the prior's mean of the slow states
+    offset : (47,) correction that leads from that mean to `globals`
+    frozen : (47) slow states that are not estimated
     joined : whether the start continues a past that is final (its first three control points follow
         the slow states as `samples` do); otherwise only the first pose stays
 

@@ -20,7 +20,7 @@ DT, RATE_HZ, SPIN = 0.01, 200.0, 5.0  # s, Hz, rad/s
 BASE = ((0.05, 0.0, -0.03), (0.0, 0.0, 0.0, 1.0))
 UP = np.array([0.0, 0.0, 9.80665])  # m/s²
 INFORMATION = np.diag(
-    np.repeat([1e5, 4e8, 1e4, 4e4, 1e4, 1e7, 6e2, 2.5e3, 1e4], [1, 1, 3, 3, 5, 3, 3, 2, 24])
+    np.repeat([1e5, 4e8, 1e4, 4e4, 1e4, 1e7, 6e2, 2.5e3, 1e4], [1, 1, 3, 3, 7, 3, 3, 2, 24])
 )
 
 
@@ -148,7 +148,7 @@ def register(flight, drifted, extract):
             "globals": make_globals(),
             "information": INFORMATION,
             "offset": [0.0] * N_STATES,
-            "frozen": [False, True] + [False] * 6 + [True] * 5 + [False] * 32,
+            "frozen": [False, True] + [False] * 6 + [True] * 7 + [False] * 32,
             "joined": False,
             "settings": core,
         }

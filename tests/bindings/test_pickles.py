@@ -42,12 +42,13 @@ def test_samples_come_back_with_their_responses(register, again):
     "motor", [{}, {"motor_axis": (0.0, 0.6, 0.8), "encoder_zero": 0.2, "T_motor_lidar": HERE}]
 )
 def test_slow_states_come_back_as_they_were(states, again, motor):
-    slow = states(latency=0.003, gyro_bias=(0.1, 0.2, 0.3), **motor)
+    slow = states(latency=0.003, gyro_bias=(0.1, 0.2, 0.3), ranges=(-0.02, 4e-4), **motor)
     other = again(slow)
     assert np.abs(other.moved_from(slow)).max() < 1e-15
     assert other.latency == slow.latency == 0.003
     assert np.array_equal(other.gyro_bias, slow.gyro_bias)
     assert other.encoder_zero == slow.encoder_zero
+    assert list(other.ranges) == list(slow.ranges) == [-0.02, 4e-4]
     assert (other.motor_lidar_translation is None) == (not motor)
 
 
@@ -75,5 +76,5 @@ def test_columns_that_do_not_fit_together_are_refused(changes, sentence):
 
 def test_responses_of_another_shape_are_refused():
     still = np.tile([0.0, 0.0, 0.0, 1.0], (2, 1))
-    with pytest.raises(ValueError, match=r"responses: expected a C-contiguous array \(K, 6, 45\)"):
+    with pytest.raises(ValueError, match=r"responses: expected a C-contiguous array \(K, 6, 47\)"):
         _core.Samples(0.0, 0.01, np.zeros((2, 3)), still, np.zeros((2, 5, N_STATES)))

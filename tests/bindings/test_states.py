@@ -143,6 +143,14 @@ def test_a_head_with_a_motor_needs_its_angles(flight, samples, states, extract):
     assert samples.place(points, stamps, np.zeros(9), states(**MOTOR)).shape == (9, 3)
 
 
+def test_points_are_placed_nearer_by_what_ranges_are_too_long(flight, drifted, states):
+    points, stamps = flight.points[:9], flight.stamps[:9]
+    placed = drifted.place(points, stamps, None, states(ranges=(0.02, 0.0)))
+    far = np.linalg.norm(points, axis=1)[:, None]
+    expected = drifted.place(points * (1.0 - 0.02 / far), stamps, None, states())
+    assert np.allclose(placed, expected, atol=1e-12)
+
+
 def test_settings_without_a_field_are_refused(extract):
     with pytest.raises(AttributeError, match="voxel_size"):
         extract(settings=RegistrationSettings())
@@ -150,7 +158,7 @@ def test_settings_without_a_field_are_refused(extract):
 
 def test_information_must_be_square(register):
     for n in (N_STATES - 1, N_STATES + 1):
-        with pytest.raises(ValueError, match=r"^information: expected shape \(45, 45\), got "):
+        with pytest.raises(ValueError, match=r"^information: expected shape \(47, 47\), got "):
             register(surfels=[], information=np.resize(1e6 * np.eye(N_STATES), (n, N_STATES)))
 
 

@@ -34,13 +34,14 @@ pub(crate) struct Piece {
     imu: Option<Py<Imu>>,
     globals: Py<Globals>,
     prior: GlobalPrior,
+    optional: [bool; N_GLOBALS],
     shown_noise: core::ShownNoise,
 }
 
 #[pymethods]
 impl Piece {
     #[new]
-    #[pyo3(signature = (samples, surfels, imu, globals, *, information, offset, frozen, shown_noise))]
+    #[pyo3(signature = (samples, surfels, imu, globals, *, information, offset, frozen, optional, shown_noise))]
     #[allow(
         clippy::large_types_passed_by_value,
         reason = "taken from Python as a whole"
@@ -54,6 +55,7 @@ impl Piece {
         information: PyReadonlyArray2<'_, f64>,
         offset: [f64; N_GLOBALS],
         frozen: [bool; N_GLOBALS],
+        optional: [bool; N_GLOBALS],
         shown_noise: (Vec<f64>, Vec<[f64; 2]>),
     ) -> PyResult<Self> {
         let (times, ratios) = shown_noise;
@@ -71,6 +73,7 @@ impl Piece {
                 offset,
                 frozen,
             },
+            optional,
             shown_noise: core::ShownNoise { times, ratios },
         })
     }
@@ -84,6 +87,7 @@ impl Piece {
             imu: self.imu.as_ref().map(|imu| &imu.get().0),
             globals: self.globals.get().0.clone(),
             prior: &self.prior,
+            optional: self.optional,
             shown_noise: self.shown_noise.clone(),
         }
     }
@@ -111,7 +115,7 @@ impl GlobalRegistration {
         pieces.map(|p| Globals(p.globals.clone())).collect()
     }
 
-    /// Covariances (45, 45) of the slow states, in the order of the pieces; zero where frozen.
+    /// Covariances (47, 47) of the slow states, in the order of the pieces; zero where frozen.
     #[getter]
     fn covariances<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyArray2<f64>>>> {
         let rows = |m: &core::GlobalMatrix| -> Vec<[f64; N_GLOBALS]> {

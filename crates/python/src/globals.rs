@@ -2,7 +2,7 @@
 //! The slow states for Python.
 
 use bentwing_registration::{Globals as RustGlobals, N_GLOBALS};
-use bentwing_trajectory::{Head, InertialUnit, LidarClock, Motor};
+use bentwing_trajectory::{Head, InertialUnit, LidarClock, Motor, RangeBias};
 use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
 use numpy::{PyArray1, ToPyArray};
 use pyo3::exceptions::PyValueError;
@@ -77,7 +77,7 @@ impl Globals {
     #[pyo3(signature = (
         T_imu_base, *, latency, gyro_bias, accel_bias, gravity, unit = None,
         motor_axis = None, encoder_zero = 0.0, T_motor_lidar = None,
-        latency_rate = 0.0, latency_epoch = 0.0,
+        latency_rate = 0.0, latency_epoch = 0.0, ranges = [0.0; 2],
     ))]
     #[allow(clippy::too_many_arguments, reason = "the states by name")]
     fn new(
@@ -92,6 +92,7 @@ impl Globals {
         T_motor_lidar: Option<Transform>,
         latency_rate: f64,
         latency_epoch: f64,
+        ranges: [f64; 2],
     ) -> PyResult<Self> {
         let motor = match (motor_axis, T_motor_lidar) {
             (None, None) => None,
@@ -117,6 +118,10 @@ impl Globals {
                 epoch: finite_number("latency_epoch", latency_epoch)?,
             },
             motor,
+            ranges: RangeBias {
+                offset: finite_number("ranges", ranges[0])?,
+                grazing: finite_number("ranges", ranges[1])?,
+            },
         };
         let unit = unit.map_or_else(|| Ok(InertialUnit::ideal()), |unit| unit.checked())?;
         Ok(Self(RustGlobals {
@@ -143,6 +148,7 @@ impl Globals {
         named.set_item("accel_bias", self.accel_bias(py))?;
         named.set_item("gravity", self.gravity(py))?;
         named.set_item("unit", self.unit())?;
+        named.set_item("ranges", self.ranges())?;
         if let Some(motor) = &self.0.head.motor {
             named.set_item("motor_axis", vector(py, &motor.axis))?;
             named.set_item("encoder_zero", motor.zero)?;
@@ -151,7 +157,7 @@ impl Globals {
         Ok(((Transform::of(&self.0.head.T_imu_base),), named))
     }
 
-    /// The correction (45,) that leads from `earlier` to these.
+    /// The correction (47,) that leads from `earlier` to these.
     fn moved_from(&self, earlier: &Self) -> [f64; N_GLOBALS] {
         self.0.moved_from(&earlier.0)
     }
@@ -215,6 +221,13 @@ impl Globals {
     #[getter]
     fn unit(&self) -> Unit {
         Unit::of(&self.0.unit)
+    }
+
+    /// By how much ranges are too long: m, and per `r tan θ`, rad.
+    #[getter]
+    fn ranges(&self) -> [f64; 2] {
+        let bias = self.0.head.ranges;
+        [bias.offset, bias.grazing]
     }
 
     /// Gravity, m/s², map frame, pointing up.

@@ -12,6 +12,7 @@ mod posterior;
 mod problem;
 mod result;
 mod scatter;
+mod shown;
 
 use gather::Gatherer;
 use joint::Joint;
@@ -20,7 +21,8 @@ pub use problem::{Counts, GlobalProblem, Iteration, Piece, Plan};
 pub use result::{GlobalRegistration, PieceResult};
 
 use crate::state::{State, StepSize};
-use crate::{N_GLOBALS, NormalEquations, Settings, SolveError, Solver};
+use crate::system::solve::Factorized;
+use crate::{Health, N_GLOBALS, NormalEquations, Settings, SolveError, Solver};
 
 /// Corrects whole trajectories and their calibrations by everything that was seen more than once.
 ///
@@ -34,38 +36,24 @@ pub fn register_globally(
         settings.require_dense(&piece.trajectory)?;
     }
     let states = problem.pieces.iter().map(|p| p.state(settings));
-    let mut states: Vec<State<'_>> = states.collect();
-    let joint = Joint::new(&states);
-    let mut gatherer = Gatherer::new(problem, &states, settings);
-    let (mut solver, mut iterations) = (Solver::default(), Vec::new());
-    let mut step_size = StepSize::UNKNOWN;
-    let factorized = loop {
-        let mut equations = NormalEquations::new(joint.n_controls());
-        for (number, (state, piece)) in states.iter_mut().zip(&problem.pieces).enumerate() {
-            let rows = state.fixed_rows(Some(piece.first_pose(number == 0)), settings);
-            joint.add_piece(&mut equations, number, &rows);
-        }
-        if step_size.moves_matches() {
-            gatherer.match_again();
-        }
-        let scale = settings.cauchy_scale_at(iterations.len());
-        let (health, n_far) = gatherer.add(&mut equations, &joint, &states, scale);
-        joint.freeze(&mut equations, &states);
-        let factorized = solver.factorize(&equations, 0, &[true; N_GLOBALS])?;
-        let steps = joint.split(&factorized.solve());
-        step_size = StepSize::NONE;
-        for (state, step) in states.iter_mut().zip(&steps) {
-            step_size = step_size.max(state.apply(step)?);
-        }
-        iterations.push(Iteration {
-            health,
-            n_far,
-            step: step_size,
-        });
-        if step_size.converged(settings) || iterations.len() >= settings.max_outer {
-            break factorized;
-        }
+    let states: Vec<State<'_>> = states.collect();
+    let mut rounds = Rounds {
+        problem,
+        settings: settings.clone(),
+        joint: Joint::new(&states),
+        gatherer: Gatherer::new(problem, &states, settings),
+        states,
+        iterations: Vec::new(),
     };
+    let settled = rounds.settle(StepSize::UNKNOWN)?;
+    let (factorized, converged) = rounds.with_what_shows(settled)?;
+    let Rounds {
+        joint,
+        mut gatherer,
+        states,
+        iterations,
+        ..
+    } = rounds;
     let (posterior, health, dispersion) =
         GlobalPosterior::new(problem, &states, &mut gatherer, settings)?;
     let counts = Counts {
@@ -85,9 +73,101 @@ pub fn register_globally(
         health,
         dispersion,
         counts,
-        converged: step_size.converged(settings),
+        converged,
         posterior,
     })
+}
+
+/// What the iterations of a registration work with.
+struct Rounds<'a> {
+    problem: &'a GlobalProblem<'a>,
+    settings: Settings,
+    joint: Joint,
+    gatherer: Gatherer,
+    states: Vec<State<'a>>,
+    iterations: Vec<Iteration>,
+}
+
+/// The last equations of some iterations, and whether nothing moved any more.
+type Settled = (Factorized, bool);
+
+impl Rounds<'_> {
+    /// Iterates until nothing moves any more, or as often as it is allowed to.
+    fn settle(&mut self, mut step_size: StepSize) -> Result<Settled, SolveError> {
+        let mut solver = Solver::default();
+        let last = self.iterations.len() + self.settings.max_outer;
+        loop {
+            if step_size.moves_matches() {
+                self.gatherer.match_again();
+            }
+            let (mut equations, health, n_far) = self.equations();
+            self.joint.freeze(&mut equations, &self.states);
+            let factorized = solver.factorize(&equations, 0, &[true; N_GLOBALS])?;
+            let steps = self.joint.split(&factorized.solve());
+            step_size = StepSize::NONE;
+            for (state, step) in self.states.iter_mut().zip(&steps) {
+                step_size = step_size.max(state.apply(step)?);
+            }
+            self.iterations.push(Iteration {
+                health,
+                n_far,
+                step: step_size,
+            });
+            let converged = step_size.converged(&self.settings);
+            if converged || self.iterations.len() >= last {
+                return Ok((factorized, converged));
+            }
+        }
+    }
+
+    /// Goes on with those of the optional states that show, unless it does not settle with them.
+    fn with_what_shows(&mut self, settled: Settled) -> Result<Settled, SolveError> {
+        let mut pieces = self.problem.pieces.iter();
+        let is_asked = pieces.any(|p| p.optional.contains(&true));
+        if !is_asked || !settled.1 {
+            return Ok(settled);
+        }
+        let (without, n_before) = (self.states.clone(), self.iterations.len());
+        let (equations, ..) = self.equations();
+        if !shown::release(equations, &self.joint, &mut self.states)? {
+            return Ok(settled);
+        }
+        // What is wrong with them has moved the poses as fast as the windows could follow.
+        let interval = self.settings.knot_interval;
+        self.use_knots(self.problem.plan.posterior_interval.min(interval));
+        let found = self.settle(StepSize::NONE)?;
+        if found.1 {
+            return Ok(found);
+        }
+        self.states = without;
+        self.use_knots(interval);
+        self.iterations.truncate(n_before);
+        self.gatherer.match_again();
+        Ok(settled)
+    }
+
+    /// Takes the states as they are with knots at another interval, s.
+    fn use_knots(&mut self, interval: f64) {
+        self.settings.knot_interval = interval;
+        let states = self.states.iter().map(|s| s.with_knots(interval));
+        self.states = states.collect();
+        self.joint = Joint::new(&self.states);
+    }
+
+    /// All rows at the present states, how the matches fit, and how many are far ones.
+    fn equations(&mut self) -> (NormalEquations, Health, usize) {
+        let mut equations = NormalEquations::new(self.joint.n_controls());
+        let pieces = self.states.iter_mut().zip(&self.problem.pieces);
+        for (number, (state, piece)) in pieces.enumerate() {
+            let rows = state.fixed_rows(Some(piece.first_pose(number == 0)), &self.settings);
+            self.joint.add_piece(&mut equations, number, &rows);
+        }
+        let scale = self.settings.cauchy_scale_at(self.iterations.len());
+        let (health, n_far) = self
+            .gatherer
+            .add(&mut equations, &self.joint, &self.states, scale);
+        (equations, health, n_far)
+    }
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ use bentwing_trajectory::{Head, InertialUnit, so3};
 use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
 
 /// Number of global states.
-pub const N_GLOBALS: usize = 45;
+pub const N_GLOBALS: usize = 47;
 /// A vector of all global states or their corrections.
 pub type GlobalVector = [f64; N_GLOBALS];
 /// A matrix over all global states.
@@ -18,9 +18,9 @@ pub mod index {
     use std::ops::Range;
 
     /// Those that place a surfel: rows of matches within a window concern no others.
-    pub const HEAD: Range<usize> = 0..13;
+    pub const HEAD: Range<usize> = 0..15;
     /// Those that inertial samples depend on.
-    pub const INERTIAL: Range<usize> = 13..45;
+    pub const INERTIAL: Range<usize> = 15..47;
 
     /// Lidar stamps minus IMU clock at the epoch of the lidar's clock, s.
     pub const LATENCY: usize = 0;
@@ -36,22 +36,26 @@ pub mod index {
     pub const MOTOR_TILT: Range<usize> = 9..11;
     /// Translation of the lidar perpendicular to the motor's axis, m, motor frame.
     pub const MOTOR_OFFSET: Range<usize> = 11..13;
+    /// By how much all ranges are too long, m.
+    pub const RANGE_OFFSET: usize = 13;
+    /// The same per `r tan θ`, rad.
+    pub const RANGE_GRAZING: usize = 14;
     /// Gyro bias, rad/s.
-    pub const GYRO_BIAS: Range<usize> = 13..16;
+    pub const GYRO_BIAS: Range<usize> = 15..18;
     /// Accelerometer bias, m/s².
-    pub const ACCEL_BIAS: Range<usize> = 16..19;
+    pub const ACCEL_BIAS: Range<usize> = 18..21;
     /// Rotation of gravity about the x and y axes of the map, rad.
-    pub const GRAVITY: Range<usize> = 19..21;
+    pub const GRAVITY: Range<usize> = 21..23;
     /// Share of its rate that is added to each axis of the gyro.
-    pub const GYRO_SCALE: Range<usize> = 21..24;
+    pub const GYRO_SCALE: Range<usize> = 23..26;
     /// How axes of the gyro lean, rad: the pair across the main axis, and the main one to both.
-    pub const GYRO_MISALIGNMENT: Range<usize> = 24..27;
+    pub const GYRO_MISALIGNMENT: Range<usize> = 26..29;
     /// Row by row, rad/s per m/s².
-    pub const G_SENSITIVITY: Range<usize> = 27..36;
+    pub const G_SENSITIVITY: Range<usize> = 29..38;
     /// Share of its force that is added to each axis of the accelerometer.
-    pub const ACCEL_SCALE: Range<usize> = 36..39;
+    pub const ACCEL_SCALE: Range<usize> = 38..41;
     /// How axes of the accelerometer lean, rad: to y and z of x, x and z of y, x and y of z.
-    pub const ACCEL_MISALIGNMENT: Range<usize> = 39..45;
+    pub const ACCEL_MISALIGNMENT: Range<usize> = 41..47;
 }
 
 /// Places of [`index::ACCEL_MISALIGNMENT`] in the matrix.
@@ -76,6 +80,8 @@ impl Globals {
         let head = &mut self.head;
         head.clock.latency += delta[index::LATENCY];
         head.clock.rate += delta[index::LATENCY_RATE];
+        head.ranges.offset += delta[index::RANGE_OFFSET];
+        head.ranges.grazing += delta[index::RANGE_GRAZING];
         let base = &mut head.T_imu_base;
         base.rotation = so3::turned(&three(index::EXTRINSIC_ROTATION), &base.rotation);
         base.translation =
@@ -115,6 +121,9 @@ impl Globals {
         let (now, then) = (&self.head.clock, &earlier.head.clock);
         delta[index::LATENCY] = now.latency - then.latency;
         delta[index::LATENCY_RATE] = now.rate - then.rate;
+        let (now, then) = (&self.head.ranges, &earlier.head.ranges);
+        delta[index::RANGE_OFFSET] = now.offset - then.offset;
+        delta[index::RANGE_GRAZING] = now.grazing - then.grazing;
         if let (Some(now), Some(then)) = (&self.head.motor, &earlier.head.motor) {
             delta[index::ENCODER_ZERO] = now.zero - then.zero;
             let (a, b) = (&now.T_motor_lidar, &then.T_motor_lidar);

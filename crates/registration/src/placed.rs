@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use bentwing_surfels::SurfelSet;
-use bentwing_trajectory::{Basis, CorrectionSpline, Trajectory};
+use bentwing_trajectory::{Basis, CorrectionSpline, Sight, Trajectory};
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
@@ -42,6 +42,8 @@ pub struct PlacedSurfel {
     pub angle: f64,
     /// Mean in the lidar frame, m.
     pub mean_lidar: Vector3<f64>,
+    /// How it was looked at, map frame.
+    pub sight: Sight,
 }
 
 /// Surfels of several sets in the map, grouped by level.
@@ -119,7 +121,9 @@ pub fn place(
     let pose = trajectory.pose(time);
     let (v, omega) = trajectory.velocity(time);
     let (R_imu_lidar, t_imu_lidar) = globals.head.lidar_in_imu(set.angles[i]);
-    let lever = pose.R * (R_imu_lidar * set.means[i] + t_imu_lidar);
+    let sight = Sight::of(&set.means[i], &set.normals[i]);
+    let mean_lidar = set.means[i] - sight.ray * globals.head.ranges.error(&sight);
+    let lever = pose.R * (R_imu_lidar * mean_lidar + t_imu_lidar);
     let R_map_lidar = pose.R * R_imu_lidar;
     PlacedSurfel {
         mean: pose.p + lever,
@@ -135,6 +139,10 @@ pub fn place(
         velocity: v + omega.cross(&lever),
         clock_age: set.stamps[i] - clock.epoch,
         angle: set.angles[i],
-        mean_lidar: set.means[i],
+        mean_lidar,
+        sight: Sight {
+            ray: R_map_lidar * sight.ray,
+            ..sight
+        },
     }
 }

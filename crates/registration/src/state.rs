@@ -11,7 +11,9 @@ use nalgebra::Vector3;
 use crate::constraints::shown_noise::ShownNoise;
 use crate::constraints::{imu, initial, motion, prior, rest, velocity};
 use crate::placed::Placed;
-use crate::{GlobalPrior, GlobalVector, Globals, NormalEquations, Settings, Solution, SolveError};
+use crate::{
+    GlobalPrior, GlobalVector, Globals, N_GLOBALS, NormalEquations, Settings, Solution, SolveError,
+};
 
 /// Largest correction of a sample in one step, rad and m.
 #[derive(Clone, Copy, Debug)]
@@ -60,8 +62,11 @@ impl StepSize {
 }
 
 /// What changes from iteration to iteration, and what it is held by.
+#[derive(Clone)]
 pub(crate) struct State<'a> {
     pub prior: &'a GlobalPrior,
+    /// Global states that are not estimated, of all and not only of those that never are.
+    pub frozen: [bool; N_GLOBALS],
     pub imu: Option<&'a Imu>,
     /// Samples that rest.
     rests: Vec<Range<usize>>,
@@ -84,6 +89,7 @@ impl<'a> State<'a> {
         let (start, end) = (trajectory.start(), trajectory.end());
         Self {
             prior,
+            frozen: prior.frozen,
             imu,
             rests: Vec::new(),
             trajectory: trajectory.clone(),

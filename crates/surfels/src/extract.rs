@@ -281,7 +281,7 @@ fn push_surfel(
     if away.abs() < settings.min_incidence_cosine * mean.norm() {
         return false;
     }
-    set.means.push(mean);
+    set.means.push(head.ranges.measured(&mean));
     set.covariances.push(covariance);
     // Turned to the sensor: otherwise thin walls match front to back.
     set.normals.push(if away > 0.0 { -normal } else { normal });

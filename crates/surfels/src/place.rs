@@ -67,7 +67,7 @@ impl<'a> Placer<'a> {
             let chunk = c * CHUNK..c * CHUNK + placed.len();
             let (points, times) = (&points[chunk.clone()], &times[chunk.clone()]);
             let turned: Vec<[f64; 3]>;
-            let points = if self.head.motor.is_some() {
+            let points = if !self.head.takes_points_as_measured() {
                 let angle = |i: usize| angles.get(i).copied().unwrap_or(0.0);
                 let in_base = |(p, i): (&[f64; 3], usize)| {
                     let p = Vector3::from(*p);
@@ -145,7 +145,7 @@ impl WithSimd for Chunk<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bentwing_trajectory::{LidarClock, Motor};
+    use bentwing_trajectory::{LidarClock, Motor, RangeBias};
     use nalgebra::Isometry3;
 
     #[test]
@@ -169,6 +169,7 @@ mod tests {
                 T_imu_base: base,
                 clock: LidarClock::late_by(0.003),
                 motor,
+                ranges: RangeBias::default(),
             };
             let p = [3.0, 20.0, -4.0];
             let placed = place_points(&[p], &[0.2574], &[1.3], &trajectory, &head)[0];

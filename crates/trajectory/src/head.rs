@@ -3,7 +3,7 @@
 
 use nalgebra::{Isometry3, Matrix3, UnitQuaternion, Vector3};
 
-use crate::so3;
+use crate::{RangeBias, so3};
 
 /// A motor that turns the lidar: `T_imu_lidar(θ) = T_imu_motor · Rot(axis, θ + zero) · T_motor_lidar`.
 #[derive(Clone, Copy, Debug)]
@@ -56,6 +56,8 @@ pub struct Head {
     pub clock: LidarClock,
     /// The motor, if the lidar is turned by one.
     pub motor: Option<Motor>,
+    /// What is wrong with the ranges.
+    pub ranges: RangeBias,
 }
 
 impl Head {
@@ -69,17 +71,23 @@ impl Head {
         (so3::matrix(&T.rotation), T.translation.vector)
     }
 
-    /// The point `p_lidar` in the base frame (lidar frame, or motor frame before its rotation),
-    /// together with the rotation `R_imu_base` and the rotation of the motor.
+    /// The measured point `p_lidar`, corrected, in the base frame (lidar frame, or motor frame before
+    /// its rotation).
     pub fn point_in_base(&self, p_lidar: &Vector3<f64>, theta: f64) -> Vector3<f64> {
+        let p = self.ranges.corrected(p_lidar);
         match &self.motor {
-            None => *p_lidar,
+            None => p,
             Some(m) => {
                 (turn(m, theta) * m.T_motor_lidar)
-                    .transform_point(&(*p_lidar).into())
+                    .transform_point(&p.into())
                     .coords
             }
         }
+    }
+
+    /// Whether points of the lidar are points in the base frame as they are.
+    pub fn takes_points_as_measured(&self) -> bool {
+        self.motor.is_none() && self.ranges.is_zero()
     }
 }
 
@@ -112,6 +120,7 @@ mod tests {
                 zero: 0.25,
                 T_motor_lidar: Isometry3::translation(0.1, 0.0, 0.0),
             }),
+            ranges: RangeBias::default(),
         };
         let quarter = std::f64::consts::FRAC_PI_2 - 0.25;
         let (R, t) = head.lidar_in_imu(quarter);

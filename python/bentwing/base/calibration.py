@@ -10,6 +10,7 @@ import numpy as np
 
 from bentwing.base.inertial_unit import InertialUnit
 from bentwing.base.mount import mount_from_json
+from bentwing.base.range_bias import RangeBias
 from bentwing.base.value import Value
 
 if TYPE_CHECKING:
@@ -38,11 +39,13 @@ class Calibration(Value):
         motor, in the IMU frame, `gyro_bias` (3,), `accel_bias` (3,), `gravity` (2,) rad, and for
         a motor `encoder_zero` (1,) rad, and of the lidar across the axis `motor_tilt` (2,) rad and
         `motor_offset` (2,) m; of the unit `gyro_scale` (3,), `gyro_misalignment` (3,) rad, `g_sensitivity`
-        (9,) rad/s per m/s², `accel_scale` (3,) and `accel_misalignment` (6,) rad
+        (9,) rad/s per m/s², `accel_scale` (3,) and `accel_misalignment` (6,) rad; of the ranges
+        `range_offset` (1,) m and `range_grazing` (1,) rad
     latency_read : s, what was taken off the lidar's stamps when they were read
     latency_rate : s/s, how much faster than the IMU's clock the lidar's runs
     latency_epoch : s, the stamp at which the latency is `latency`
     unit : how the IMU answers beside its biases
+    ranges : by how much they are too long
     """
 
     latency: float
@@ -55,6 +58,7 @@ class Calibration(Value):
     latency_rate: float = 0.0
     latency_epoch: float = 0.0
     unit: InertialUnit = field(default_factory=InertialUnit)
+    ranges: RangeBias = field(default_factory=RangeBias)
 
     def measured(self, stamps: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return when on the clock of the IMU it was that the lidar stamps so, s."""
@@ -82,6 +86,7 @@ class Calibration(Value):
             "mount": self.mount.to_json(),
             **{name: getattr(self, name).tolist() for name in _VECTORS},
             "unit": self.unit.to_json(),
+            "ranges": self.ranges.to_json(),
             "std": self.std,
         }
 
@@ -102,4 +107,5 @@ class Calibration(Value):
             latency_rate=rate,
             latency_epoch=epoch,
             unit=InertialUnit.from_json(described.get("unit")),
+            ranges=RangeBias.from_json(described.get("ranges")),
         )

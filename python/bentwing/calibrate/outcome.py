@@ -11,6 +11,7 @@ import numpy as np
 from bentwing.base.mount import FixedMount
 from bentwing.calibrate.motor_mount import OFFSET_PRIOR
 from bentwing.recording.sections.calibration import CalibrationRecord
+from bentwing.recording.sections.ranges import Ranges
 from bentwing.recording.sections.section import Transform
 
 if TYPE_CHECKING:
@@ -99,10 +100,20 @@ def with_motion(payload: Payload, found: Calibration) -> Payload:
     if "latency" not in found.std:
         return payload
     known = payload.calibration or CalibrationRecord()
-    names = ["latency", "extrinsic_rotation", "extrinsic_translation"]
-    update: dict[str, Any] = {
-        "lidar": payload.lidar.model_copy(update={"latency": round(found.source_latency, DIGITS)})
-    }
+    names = [
+        "latency",
+        "extrinsic_rotation",
+        "extrinsic_translation",
+        "range_offset",
+        "range_grazing",
+    ]
+    lidar: dict[str, Any] = {"latency": round(found.source_latency, DIGITS)}
+    if found.std.keys() & {"range_offset", "range_grazing"}:
+        bias = found.ranges
+        lidar["ranges"] = Ranges(
+            offset=round(bias.offset, DIGITS), grazing=round(bias.grazing, DIGITS)
+        )
+    update: dict[str, Any] = {"lidar": payload.lidar.model_copy(update=lidar)}
     mount = found.mount
     if isinstance(mount, FixedMount):
         update["T_imu_lidar"] = _transform(mount.T_imu_lidar)

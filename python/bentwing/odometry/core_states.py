@@ -11,6 +11,7 @@ import numpy as np
 from bentwing import _core
 from bentwing.base.inertial_unit import InertialUnit
 from bentwing.base.mount import FixedMount, MotorMount, Mount, Pose
+from bentwing.base.range_bias import RangeBias
 
 if TYPE_CHECKING:
     from bentwing.base.calibration import Calibration
@@ -27,6 +28,7 @@ def core_globals(calibration: Calibration) -> _core.Globals:
         "latency", "latency_rate", "latency_epoch", "gyro_bias", "accel_bias", "gravity",
     )  # fmt: skip
     slow = {name: getattr(calibration, name) for name in names}
+    slow["ranges"] = [calibration.ranges.offset, calibration.ranges.grazing]
     slow["unit"] = (unit.gyro, unit.g_sensitivity, unit.accel, unit.reference, unit.main_axis)
     if isinstance(mount, FixedMount):
         return _core.Globals(core_pose(mount.T_imu_lidar), **slow)
@@ -40,7 +42,7 @@ def core_globals(calibration: Calibration) -> _core.Globals:
 
 
 def refined(described: Calibration, slow: _core.Globals) -> Calibration:
-    """Return a calibration with clock, mount and unit of the slow states; gravity stays."""
+    """Return a calibration with clock, mount, unit and ranges of the slow states; gravity stays."""
     return replace(
         described,
         latency=slow.latency,
@@ -50,6 +52,7 @@ def refined(described: Calibration, slow: _core.Globals) -> Calibration:
         gyro_bias=slow.gyro_bias,
         accel_bias=slow.accel_bias,
         unit=unit_of(slow),
+        ranges=RangeBias(*slow.ranges),
     )
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from bentwing.base.calibration import STANDARD_GRAVITY, Calibration
 from bentwing.base.mount import FixedMount, MotorMount, Pose
+from bentwing.base.range_bias import RangeBias
 
 if TYPE_CHECKING:
     from bentwing.base.mount import Mount
@@ -30,10 +31,11 @@ def described_mount(payload: Payload) -> Mount:
 
 
 def described_calibration(payload: Payload) -> Calibration:
-    """Return latency and mount as the payload describes them, without biases, gravity along z.
+    """Return latency, mount and ranges as the payload describes them, no biases, gravity along z.
 
     A large latency is taken off the stamps when they are read, so that no estimator meets it.
     """
+    ranges = payload.lidar.ranges
     return Calibration(
         latency=payload.lidar.latency_left,
         mount=described_mount(payload),
@@ -41,4 +43,5 @@ def described_calibration(payload: Payload) -> Calibration:
         accel_bias=np.zeros(3),
         gravity=np.array([0.0, 0.0, STANDARD_GRAVITY]),
         latency_read=payload.lidar.latency_read,
+        ranges=RangeBias() if ranges is None else ranges.bias,
     )

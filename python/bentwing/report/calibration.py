@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from bentwing.base.inertial_unit import InertialUnit
     from bentwing.base.mount import Mount, Pose
+    from bentwing.base.range_bias import RangeBias
 
 DEGREES = 180 / np.pi
 _PER_G = DEGREES * STANDARD_GRAVITY
@@ -37,6 +38,7 @@ def calibration_table(calibration: Mapping[str, Any] | None) -> str:
         _row("gravity in the map, m/s²", found.gravity, None, 1.0, 4),
     ]
     rows += _unit_rows(found.unit, std)
+    rows += _range_rows(found.ranges, std)
     if std.get("gravity"):
         rows.append(_row("direction of gravity, °", [0.0, 0.0], std["gravity"], DEGREES, 3))
     head = ("quantity", "estimate", "standard deviation")
@@ -61,6 +63,15 @@ def _unit_rows(unit: InertialUnit, std: Mapping[str, list[float]]) -> list[tuple
         for name, (title, found, scale, digits) in values.items()
         if name in std
     ]
+
+
+def _range_rows(ranges: RangeBias, std: Mapping[str, list[float]]) -> list[tuple[str, str, str]]:
+    """Make the rows of what is wrong with the ranges: of what was found or described."""
+    rows = [
+        ("ranges too long, mm", ranges.offset, std.get("range_offset"), 1),
+        ("the same under 45°, mm per m", ranges.grazing, std.get("range_grazing"), 2),
+    ]
+    return [_row(name, [value], known, 1e3, n) for name, value, known, n in rows if known or value]
 
 
 def _rate_row(found: Calibration, std: Sequence[float] | None) -> list[tuple[str, str, str]]:

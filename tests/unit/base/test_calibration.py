@@ -12,6 +12,7 @@ from bentwing.base.calibration import Calibration
 from bentwing.base.inertial_unit import InertialUnit
 from bentwing.base.mount import FixedMount, MotorMount, Pose
 from bentwing.base.plain import plain
+from bentwing.base.range_bias import RangeBias
 
 POSE = Pose(np.array([0.03, -0.01, 0.05]), geometry.exp(np.array([0.1, -0.2, 0.3])))
 BEHIND = Pose(np.array([0.0, 0.02, -0.07]), geometry.exp(np.array([1.5, 0.1, 0.0])))
@@ -118,3 +119,11 @@ def test_the_drift_is_kept_in_the_record_and_runs_without_it_are_read():
     assert Calibration.from_json(described) == DRIFTING
     del described["latency_rate"], described["latency_epoch"]
     assert Calibration.from_json(described).latency_rate == 0.0
+
+
+def test_ranges_are_read_from_json_and_are_right_in_runs_that_do_not_have_them():
+    given = replace(calibration(MOTOR), ranges=RangeBias(-0.021, 4e-4))
+    written = json.loads(json.dumps(plain(given)))
+    assert Calibration.from_json(written).ranges == given.ranges
+    del written["ranges"]
+    assert Calibration.from_json(written).ranges == RangeBias()

@@ -16,6 +16,7 @@ from bentwing.odometry.continuous.slow_states import (
     SlowStatePrior,
     at_epoch,
     initial_std,
+    places_of,
 )
 from bentwing.odometry.start import attitude_of
 from bentwing.recording.sections.imu import Imu
@@ -119,6 +120,11 @@ def test_a_unit_is_taken_as_ideal_where_the_start_is_in_motion():
     # Nor are the others less certain for it.
     known = np.sqrt(1.0 / np.diag(moving.information))
     assert known[SLICES["accel_bias"]] == pytest.approx(initial_std(moving=True)["accel_bias"])
+
+
+def test_places_are_those_of_the_named_states_alone():
+    chosen = places_of(["latency", "accel_misalignment"])
+    assert np.flatnonzero(chosen).tolist() == [0, *range(N_STATES - 6, N_STATES)]
 
 
 def test_without_an_imu_its_states_are_frozen():

@@ -10,6 +10,7 @@ import yaml
 from bentwing.base.calibration import Calibration
 from bentwing.base.mount import FixedMount, MotorMount, Pose
 from bentwing.base.plain import plain
+from bentwing.base.range_bias import RangeBias
 from bentwing.recording import Payload
 from bentwing.recording.described import described_calibration, described_mount
 
@@ -39,3 +40,17 @@ def test_without_a_description_lidar_and_imu_coincide():
 def test_a_zero_in_degrees_is_refused():
     with pytest.raises(ValueError, match="zero"):
         Payload.model_validate({"encoder": {"zero": 90.0}})
+
+
+def test_estimators_start_from_the_described_ranges(tmp_path):
+    payload = Payload.model_validate({"lidar": {"ranges": {"offset": -0.021, "grazing": 4e-4}}})
+    assert described_calibration(payload).ranges == RangeBias(-0.021, 4e-4)
+    assert described_calibration(Payload.default()).ranges == RangeBias()
+    payload.save(tmp_path / "payload.yaml")
+    assert Payload.load(tmp_path / "payload.yaml") == payload
+
+
+@pytest.mark.parametrize("wrong", [{"offset": 1.5}, {"grazing": 0.2}, {"scale": 1e-3}])
+def test_ranges_that_no_lidar_has_are_refused(wrong):
+    with pytest.raises(ValueError, match=f"ranges.*{next(iter(wrong))}"):
+        Payload.model_validate({"lidar": {"ranges": wrong}})

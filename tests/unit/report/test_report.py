@@ -155,6 +155,19 @@ def test_what_the_inertial_unit_does_wrong_is_shown_where_it_was_estimated():
     assert "accelerometer scale" not in html
 
 
+def test_what_is_wrong_with_the_ranges_is_shown_where_it_was_found_or_described():
+    ranges = {"offset": -0.0287, "grazing": 0.0}
+    html = calibration_table(
+        {**RECORD["calibration"], "ranges": ranges, "std": {"range_offset": [9.8e-4]}}
+    )
+    for text in ("ranges too long, mm", "-28.7", "± 1.0"):
+        assert text in html, text
+    assert "under 45°" not in html
+    described = calibration_table({**RECORD["calibration"], "ranges": ranges, "std": {}})
+    assert "-28.7" in described
+    assert "ranges" not in calibration_table({**RECORD["calibration"], "std": {}})
+
+
 def test_the_page_is_the_same_without_a_drawing_library(tmp_path, whole_page, monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     assert written(tmp_path)[1].counts == whole_page[1].counts

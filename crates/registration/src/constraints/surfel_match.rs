@@ -94,6 +94,9 @@ pub fn add_globals(
         globals[index::EXTRINSIC_ROTATION.start + c] += sign * rotation[c];
         globals[index::EXTRINSIC_TRANSLATION.start + c] += sign * n_imu[c];
     }
+    let nearer = -sign * n.dot(&surfel.sight.ray);
+    globals[index::RANGE_OFFSET] += nearer;
+    globals[index::RANGE_GRAZING] += nearer * surfel.sight.slant;
     if let Some(motor) = &head.motor {
         let n_base = head.T_imu_base.rotation.inverse() * n_imu;
         let p_base = head.T_imu_base.rotation.inverse() * turned;

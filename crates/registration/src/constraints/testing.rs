@@ -3,7 +3,7 @@
 
 use bentwing_surfels::SurfelSet;
 use bentwing_trajectory::{
-    CorrectionSpline, Head, InertialUnit, LidarClock, Motor, Trajectory, so3,
+    CorrectionSpline, Head, InertialUnit, LidarClock, Motor, RangeBias, Trajectory, so3,
 };
 use nalgebra::{Isometry3, Matrix3, Vector3};
 use proptest::prelude::*;
@@ -81,6 +81,10 @@ impl Scene {
                             epoch: 1.5,
                         },
                         motor: Some(motor),
+                        ranges: RangeBias {
+                            offset: 0.02,
+                            grazing: 1e-3,
+                        },
                     };
                     let unit = InertialUnit {
                         gyro_bias: Vector3::new(0.01, 0.02, -0.03),

@@ -104,7 +104,7 @@ fn bend_at<'a>(
 mod tests {
     use super::*;
     use crate::constraints::surfel_match::MatchPlane;
-    use bentwing_trajectory::Basis;
+    use bentwing_trajectory::{Basis, Sight};
     use proptest::prelude::*;
 
     const VOXEL: f64 = 0.4;
@@ -125,6 +125,7 @@ mod tests {
             clock_age: 0.0,
             angle: 0.0,
             mean_lidar: Vector3::zeros(),
+            sight: Sight::of(&Vector3::x(), &Vector3::x()),
         }
     }
 

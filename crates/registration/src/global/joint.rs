@@ -43,7 +43,7 @@ impl Joint {
     pub fn n_unknowns(&self, states: &[State<'_>]) -> usize {
         let active = states
             .iter()
-            .map(|s| s.prior.frozen.iter().filter(|f| !*f).count());
+            .map(|s| s.frozen.iter().filter(|f| !*f).count());
         6 * self.first[self.n_pieces()] + active.sum::<usize>()
     }
 
@@ -108,12 +108,7 @@ impl Joint {
         let frozen = |control: usize, i: usize| {
             let place = 6 * (control - first) + i;
             let (piece, state) = (place / (6 * N_STAND_INS), place % (6 * N_STAND_INS));
-            states[piece]
-                .prior
-                .frozen
-                .get(state)
-                .copied()
-                .unwrap_or(true)
+            states[piece].frozen.get(state).copied().unwrap_or(true)
         };
         for ((row, column), block) in equations.blocks_mut() {
             for (c, entries) in block.iter_mut().enumerate() {
@@ -155,7 +150,7 @@ impl Joint {
         state: &State<'_>,
     ) -> GlobalMatrix {
         let all = factorized.covariance(self.stand_in(piece)..self.stand_in(piece + 1), &[]);
-        let frozen = state.prior.frozen;
+        let frozen = state.frozen;
         GlobalMatrix::from_fn(|r, c| {
             if frozen[r] || frozen[c] {
                 0.0

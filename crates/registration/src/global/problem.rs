@@ -9,7 +9,7 @@ use bentwing_trajectory::{Imu, Trajectory};
 use crate::constraints::initial;
 use crate::constraints::shown_noise::ShownNoise;
 use crate::state::State;
-use crate::{GlobalPrior, Globals, Health, Settings, StepSize};
+use crate::{GlobalPrior, Globals, Health, N_GLOBALS, Settings, StepSize};
 
 /// A trajectory without a break, with what was measured along it.
 pub struct Piece<'a> {
@@ -25,19 +25,25 @@ pub struct Piece<'a> {
     pub globals: Globals,
     /// What is known of them.
     pub prior: &'a GlobalPrior,
+    /// Those that stay as they are unless the recording shows that they are others.
+    pub optional: [bool; N_GLOBALS],
 }
 
 impl Piece<'_> {
     /// The piece before the first iteration.
     pub(super) fn state(&self, settings: &Settings) -> State<'_> {
-        State::new(
+        let mut state = State::new(
             &self.trajectory,
             &self.globals,
             self.prior,
             self.imu,
             settings,
         )
-        .resting()
+        .resting();
+        for (frozen, optional) in state.frozen.iter_mut().zip(self.optional) {
+            *frozen |= optional;
+        }
+        state
     }
 
     /// How its first pose is held; the map is where the piece that `defines_map` has it.

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use bentwing_surfels::SurfelSet;
-use bentwing_trajectory::{Head, InertialUnit, LidarClock, Trajectory, so3};
+use bentwing_trajectory::{Head, InertialUnit, LidarClock, RangeBias, Sight, Trajectory, so3};
 use nalgebra::{DMatrix, Isometry3, Matrix3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
@@ -13,7 +13,7 @@ use super::*;
 use crate::constraints::shown_noise::ShownNoise;
 use crate::constraints::testing::{Scene, settings};
 use crate::placed::place;
-use crate::{GlobalMatrix, GlobalPrior, Globals};
+use crate::{GlobalMatrix, GlobalPrior, Globals, index};
 
 /// Seconds of a lap, and what the room measures, m.
 const LAP: f64 = 20.0;
@@ -69,7 +69,9 @@ fn chunk(from: f64, to: f64, head: &Head) -> Arc<SurfelSet> {
         let R_lidar_map = (R.to_rotation_matrix().into_inner() * R_imu_lidar).transpose();
         let flat = Matrix3::from_diagonal(&Vector3::from_element(0.02))
             - normal * normal.transpose() * 0.02;
-        set.means.push(R_lidar_map * (point - p - R * t_imu_lidar));
+        let mean = R_lidar_map * (point - p - R * t_imu_lidar);
+        let sight = Sight::of(&mean, &(R_lidar_map * normal));
+        set.means.push(mean + sight.ray * head.ranges.error(&sight));
         set.covariances
             .push(R_lidar_map * flat * R_lidar_map.transpose());
         set.normals.push(R_lidar_map * normal);
@@ -87,6 +89,7 @@ fn globals() -> Globals {
             T_imu_base: Isometry3::new(Vector3::new(0.05, 0.0, -0.1), Vector3::new(0.0, 1.5, 0.1)),
             clock: LidarClock::late_by(0.002),
             motor: None,
+            ranges: RangeBias::default(),
         },
         unit: InertialUnit::ideal(),
         gravity: Vector3::z() * 9.8,
@@ -155,6 +158,7 @@ fn a_slow_drift_is_taken_out_of_laps_through_a_room() -> Result<(), SolveError> 
         shown_noise: ShownNoise::default(),
         globals,
         prior: &prior,
+        optional: [false; N_GLOBALS],
     };
     let problem = GlobalProblem {
         pieces: vec![piece],
@@ -197,7 +201,7 @@ fn a_slow_drift_is_taken_out_of_laps_through_a_room() -> Result<(), SolveError> 
 fn a_second_piece_with_its_own_latency_joins_the_first() -> Result<(), SolveError> {
     let (first, mut second) = (globals(), globals());
     let mut prior_of_second = prior();
-    prior_of_second.frozen[crate::index::LATENCY] = false;
+    prior_of_second.frozen[index::LATENCY] = false;
     let (a, b) = (
         chunks(0.0, 20.0, &first.head),
         chunks(40.0, 60.0, &second.head),
@@ -215,6 +219,7 @@ fn a_second_piece_with_its_own_latency_joins_the_first() -> Result<(), SolveErro
                 shown_noise: ShownNoise::default(),
                 globals: first,
                 prior: &prior_of_first,
+                optional: [false; N_GLOBALS],
             },
             Piece {
                 trajectory: shifted,
@@ -223,6 +228,7 @@ fn a_second_piece_with_its_own_latency_joins_the_first() -> Result<(), SolveErro
                 shown_noise: ShownNoise::default(),
                 globals: second,
                 prior: &prior_of_second,
+                optional: [false; N_GLOBALS],
             },
         ],
         plan: plan(),
@@ -240,6 +246,69 @@ fn a_second_piece_with_its_own_latency_joins_the_first() -> Result<(), SolveErro
     Ok(())
 }
 
+/// What a flight of 40 s finds if its ranges are wrong by `truth`, with optional states or without.
+fn flown(truth: RangeBias, is_asked: bool) -> Result<GlobalRegistration, SolveError> {
+    let globals = globals();
+    let seen = Head {
+        ranges: truth,
+        ..globals.head
+    };
+    let chunks = chunks(0.0, 40.0, &seen);
+    let mut prior = prior();
+    let mut optional = [false; N_GLOBALS];
+    for (g, std) in [(index::RANGE_OFFSET, 0.02), (index::RANGE_GRAZING, 7e-4)] {
+        prior.information[(g, g)] = f64::powi(std, -2);
+        prior.frozen[g] = !is_asked;
+        optional[g] = is_asked;
+    }
+    let problem = GlobalProblem {
+        pieces: vec![Piece {
+            trajectory: trajectory(0.0, 40.0, slow_drift),
+            chunks: &chunks,
+            imu: None,
+            shown_noise: ShownNoise::default(),
+            globals,
+            prior: &prior,
+            optional,
+        }],
+        plan: plan(),
+    };
+    register_globally(&problem, &of_global())
+}
+
+#[test]
+fn ranges_that_are_too_long_show_and_are_taken_back() -> Result<(), SolveError> {
+    let truth = RangeBias {
+        offset: 0.025,
+        grazing: 1.5e-3,
+    };
+    let exact = trajectory(0.0, 40.0, |_| Vector3::zeros());
+    let blind = worst(&flown(truth, false)?.pieces[0].trajectory, &exact);
+    let found = flown(truth, true)?;
+    let piece = &found.pieces[0];
+    let ranges = piece.globals.head.ranges;
+    assert!(found.converged);
+    assert!((ranges.offset - truth.offset).abs() < 1e-3, "{ranges:?}");
+    assert!((ranges.grazing - truth.grazing).abs() < 2e-4, "{ranges:?}");
+    let left = worst(&piece.trajectory, &exact);
+    assert!(left < 0.3 * blind, "{left} m instead of {blind} m");
+    let variance = piece.covariance[(index::RANGE_OFFSET, index::RANGE_OFFSET)];
+    assert!((1e-8..4e-6).contains(&variance), "{variance}");
+    Ok(())
+}
+
+#[test]
+fn states_that_do_not_show_change_no_bit() -> Result<(), SolveError> {
+    let asked = flown(RangeBias::default(), true)?;
+    let unasked = flown(RangeBias::default(), false)?;
+    let [a, b] = [&asked, &unasked].map(|f| &f.pieces[0]);
+    assert_eq!(a.trajectory.positions(), b.trajectory.positions());
+    assert_eq!(a.globals.head.ranges, RangeBias::default());
+    assert_eq!(a.covariance, b.covariance);
+    assert_eq!(asked.iterations.len(), unasked.iterations.len());
+    Ok(())
+}
+
 #[test]
 fn neither_threads_nor_what_is_held_change_a_bit() -> Result<(), SolveError> {
     let (globals, prior) = (globals(), prior());
@@ -252,6 +321,7 @@ fn neither_threads_nor_what_is_held_change_a_bit() -> Result<(), SolveError> {
             shown_noise: ShownNoise::default(),
             globals: globals.clone(),
             prior: &prior,
+            optional: [false; N_GLOBALS],
         };
         let problem = GlobalProblem {
             pieces: vec![piece],
@@ -288,6 +358,7 @@ fn a_stretch_is_matched_with_few_others_however_often_it_is_seen() {
         shown_noise: ShownNoise::default(),
         globals,
         prior: &prior,
+        optional: [false; N_GLOBALS],
     };
     let plan = Plan {
         n_visits: 2,
@@ -324,6 +395,7 @@ proptest! {
             shown_noise: ShownNoise::default(),
             globals: scene.globals.clone(),
             prior: &known,
+            optional: [false; N_GLOBALS],
         };
         let pieces = [piece(&one), piece(&two)];
         let states: Vec<State<'_>> =

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-use bentwing_trajectory::{LidarClock, TrajectoryError, so3};
+use bentwing_trajectory::{LidarClock, RangeBias, TrajectoryError, so3};
 use nalgebra::Isometry3;
 
 use super::*;
@@ -25,6 +25,7 @@ fn head() -> Head {
         T_imu_base: Isometry3::new(Vector3::new(0.03, 0.0, -0.05), Vector3::new(0.0, 0.02, 0.1)),
         clock: LidarClock::late_by(0.002),
         motor: None,
+        ranges: RangeBias::default(),
     }
 }
 
@@ -136,6 +137,7 @@ fn a_pause_splits_a_cell_in_two_surfels() {
         T_imu_base: Isometry3::identity(),
         clock: LidarClock::default(),
         motor: None,
+        ranges: RangeBias::default(),
     };
     let patch = |k: i32| {
         [

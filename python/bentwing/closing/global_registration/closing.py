@@ -26,7 +26,12 @@ from bentwing.closing.global_registration.stretches import (
     length_of,
 )
 from bentwing.odometry.continuous.core_settings import CoreSettings
-from bentwing.odometry.continuous.slow_states import SLICES, SlowStatePrior
+from bentwing.odometry.continuous.slow_states import (
+    RANGE_STATES,
+    SLICES,
+    SlowStatePrior,
+    places_of,
+)
 from bentwing.odometry.core_states import core_globals, core_samples
 
 if TYPE_CHECKING:
@@ -36,6 +41,8 @@ if TYPE_CHECKING:
     from bentwing.recording import Batch, Payload
 
 _log = get_logger(__name__)
+
+_OPTIONAL = places_of(RANGE_STATES)
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,7 +175,7 @@ def register_jointly(
     fixed = [] if known is None else [fixed_piece(known)]
     try:
         found = _core.register_globally(
-            [*fixed, *(_piece(s, r) for r in recorded for s in r.segments)],
+            [*fixed, *(_piece(s, r, settings.frozen) for r in recorded for s in r.segments)],
             settings=CoreSettings.of(
                 settings.registration(budget.seconds),
                 _cautious([r.payload for r in recorded]),
@@ -218,16 +225,16 @@ def _cautious(payloads: Sequence[Payload]) -> Payload:
     return first.model_copy(update=update)
 
 
-def _piece(stretches: Stretches, recorded: Recorded) -> _core.Piece:
+def _piece(stretches: Stretches, recorded: Recorded, frozen: Iterable[str]) -> _core.Piece:
     estimate, inertial, payload = recorded.estimate, recorded.inertial, recorded.payload
     used = has_inertial_states(estimate) and payload.imu is not None and len(inertial.times) > 0
     # The map is level, and stays so: gravity is where it belongs, the trajectory may tilt.
-    known = [name for name in SLICES if name not in estimate.calibration.std]
+    known = SLICES.keys() - estimate.calibration.std.keys() - set(RANGE_STATES)
     prior = SlowStatePrior(
         payload.imu if used else None,
         has_motor=isinstance(estimate.calibration.mount, MotorMount),
         moving=True,
-        frozen={*known, "gravity"},
+        frozen={*known, *frozen, "gravity"},
     )
     return _core.Piece(
         core_samples(stretches.trajectory),
@@ -237,6 +244,7 @@ def _piece(stretches: Stretches, recorded: Recorded) -> _core.Piece:
         information=prior.information,
         offset=prior.offset,
         frozen=prior.frozen.tolist(),
+        optional=_OPTIONAL.tolist(),
         shown_noise=shown_noise(estimate) if used else ([], []),
     )
 

@@ -39,5 +39,6 @@ def fixed_piece(surfels: _core.Surfels) -> _core.Piece:
         information=np.zeros((N_STATES, N_STATES)),
         offset=[0.0] * N_STATES,
         frozen=[True] * N_STATES,
+        optional=[False] * N_STATES,
         shown_noise=([], []),
     )

@@ -5,11 +5,11 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from bentwing.base.settings import Settings
 from bentwing.base.units import Metres, Radians, Seconds, Unit
-from bentwing.odometry.continuous.settings import RegistrationSettings, SurfelSettings
+from bentwing.odometry.continuous.settings import RegistrationSettings, SurfelSettings, known_states
 
 
 class GlobalSettings(Settings):
@@ -62,7 +62,13 @@ class GlobalSettings(Settings):
         le=1e6,
         description="memory of surfels and equations; surfels are thinned to fit",
     )
+    frozen: tuple[str, ...] = Field(
+        default=(),
+        description="slow states that stay as the estimate has them, such as `range_offset`",
+    )
     surfels: SurfelSettings = Field(default=SurfelSettings(), description="what makes a surfel")
+
+    _known_states = field_validator("frozen")(known_states)
 
     def interval_for(self, seconds: float) -> float:
         """Return the knot interval, s, of a recording of this length.

@@ -14,7 +14,11 @@ from bentwing.base import geometry
 from bentwing.base.trajectory import DT
 from bentwing.odometry.continuous.core_settings import CoreSettings
 from bentwing.odometry.continuous.odometry_pass import OdometryPass
-from bentwing.odometry.continuous.slow_states import SlowStatePrior, initial_std
+from bentwing.odometry.continuous.slow_states import (
+    RANGE_STATES,
+    SlowStatePrior,
+    initial_std,
+)
 from bentwing.odometry.core_states import core_globals
 from bentwing.odometry.segments import extrapolated, heading
 from bentwing.odometry.start import attitude_of, find_start, level_start
@@ -131,7 +135,8 @@ def _prior(beginning: Beginning, payload: Payload, before: OdometryPass | None) 
         payload.imu if beginning.has_imu else None,
         has_motor=payload.encoder is not None,
         moving=moving,
-        frozen=beginning.settings.frozen,
+        # Few seconds say too little of them; see the global registration.
+        frozen=(*beginning.settings.frozen, *RANGE_STATES),
         stated={} if payload.calibration is None else payload.calibration.std,
     )
     if static is not None:

@@ -12,6 +12,21 @@ from bentwing.base.units import Metres, Radians, Seconds, Unit
 from bentwing.odometry.continuous.slow_states import SLICES
 
 
+def known_states(names: tuple[str, ...]) -> tuple[str, ...]:
+    """Return names of slow states.
+
+    Raises
+    ------
+    ValueError
+        There is no such state.
+    """
+    unknown = sorted(set(names) - SLICES.keys())
+    if unknown:
+        msg = f"unknown states {unknown}; choose from {list(SLICES)}"
+        raise ValueError(msg)
+    return names
+
+
 class SurfelSettings(Settings):
     """What makes a surfel (Kaul 2015, section 2.1)."""
 
@@ -140,14 +155,7 @@ class ContinuousSettings(Settings):
         default=RegistrationSettings(), description="how a window is registered"
     )
 
-    @field_validator("frozen")
-    @classmethod
-    def _known_states(cls, names: tuple[str, ...]) -> tuple[str, ...]:
-        unknown = sorted(set(names) - SLICES.keys())
-        if unknown:
-            msg = f"unknown states {unknown}; choose from {list(SLICES)}"
-            raise ValueError(msg)
-        return names
+    _known_states = field_validator("frozen")(known_states)
 
     def without_imu(self) -> ContinuousSettings:
         """Return the settings with the window that suits a lidar alone."""

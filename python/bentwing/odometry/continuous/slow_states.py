@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     Stated = Mapping[str, Sequence[float]]
 
-N_STATES = 45
+N_STATES = 47
 # Order of the core's `registration::index`.
 SLICES = {
     "latency": slice(0, 1),
@@ -31,22 +31,26 @@ SLICES = {
     "encoder_zero": slice(8, 9),
     "motor_tilt": slice(9, 11),
     "motor_offset": slice(11, 13),
-    "gyro_bias": slice(13, 16),
-    "accel_bias": slice(16, 19),
-    "gravity": slice(19, 21),
-    "gyro_scale": slice(21, 24),
-    "gyro_misalignment": slice(24, 27),
-    "g_sensitivity": slice(27, 36),
-    "accel_scale": slice(36, 39),
-    "accel_misalignment": slice(39, 45),
+    "range_offset": slice(13, 14),
+    "range_grazing": slice(14, 15),
+    "gyro_bias": slice(15, 18),
+    "accel_bias": slice(18, 21),
+    "gravity": slice(21, 23),
+    "gyro_scale": slice(23, 26),
+    "gyro_misalignment": slice(26, 29),
+    "g_sensitivity": slice(29, 38),
+    "accel_scale": slice(38, 41),
+    "accel_misalignment": slice(41, 47),
 }
 UNIT_STATES = (
     "gyro_scale", "gyro_misalignment", "g_sensitivity", "accel_scale", "accel_misalignment",
 )  # fmt: skip
 MOTOR_STATES = ("encoder_zero", "motor_tilt", "motor_offset")
+RANGE_STATES = ("range_offset", "range_grazing")
 
 # Standard deviations before anything was measured: s, rad, m, rad/s, m/s², rad, rad, rad, m, s/s. Two
 # crystals are up to 20 ppm off each. Where little shows the rate, no more of it should be believed.
+# Rangefinders are right to ± 10 to 30 mm, and echoes late by a tenth to a third of a beam of 3 mrad.
 INITIAL_STD = {
     "latency": 3e-3,
     "extrinsic_rotation": 9e-3,
@@ -58,6 +62,8 @@ INITIAL_STD = {
     "motor_tilt": 9e-3,
     "motor_offset": 3e-3,
     "latency_rate": 2e-5,
+    "range_offset": 0.02,
+    "range_grazing": 7e-4,
 }
 # States of which a payload may state that they are less certain.
 DESCRIBED = ("latency", "extrinsic_rotation", "extrinsic_translation")
@@ -119,26 +125,25 @@ class SlowStatePrior:
             std |= _with_unit(std, imu.errors_expected)
         frozen = {*frozen, *(name for name in UNIT_STATES if std[name] == 0.0)}
         names = _frozen_names(frozen, has_imu=imu is not None, has_motor=has_motor)
-        self.frozen = np.zeros(N_STATES, dtype=bool)
         self._information = np.zeros((N_STATES, N_STATES))
         self._offset = np.zeros(N_STATES)
         self._walk = np.zeros(N_STATES)
         walk = WALK if imu is None else WALK | {"gyro_bias": imu.gyro_walk_expected}
+        self.frozen = places_of(names)
         for name, place in SLICES.items():
             index = np.arange(N_STATES)[place]
-            self.frozen[place] = name in names
             # What is known exactly is frozen: any number keeps the matrix regular.
             self._information[index, index] = (std[name] or 1.0) ** -2
             self._walk[place] = walk.get(name, 0.0) ** 2
 
     @property
     def information(self) -> NDArray[np.float64]:
-        """(45, 45) information about the prior's mean."""
+        """(47, 47) information about the prior's mean."""
         return self._information
 
     @property
     def offset(self) -> list[float]:
-        """Correction (45,) that leads from the prior's mean to the current values."""
+        """Correction (47,) that leads from the prior's mean to the current values."""
         return self._offset.tolist()
 
     def reset(self, name: str, std: float | NDArray[np.float64]) -> None:
@@ -177,7 +182,7 @@ class SlowStatePrior:
         self._offset[:] = np.linalg.solve(self._information, before @ self._offset)
 
     def discounted(self, covariance: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the covariance (45, 45) after a window as it is if matches depend on each other."""
+        """Return the covariance (47, 47) after a window as it is if matches depend on each other."""
         active = ~self.frozen
         honest = np.zeros_like(covariance)
         if active.any():
@@ -197,8 +202,8 @@ class SlowStatePrior:
 
         Parameters
         ----------
-        covariance : (45, 45) of the slow states after the window, prior included
-        offset : (45,) correction that leads from the prior's mean to the window's estimate
+        covariance : (47, 47) of the slow states after the window, prior included
+        offset : (47,) correction that leads from the prior's mean to the window's estimate
         shift, window : s
         """
         active = ~self.frozen
@@ -216,7 +221,7 @@ class SlowStatePrior:
         self._offset[active] = estimate - np.linalg.solve(after, pull)
 
     def _gained(
-        self, covariance: NDArray[np.float64], block: tuple[NDArray[np.intp], ...]
+        self, covariance: NDArray[np.float64], block: tuple[NDArray[Any], ...]
     ) -> NDArray[np.float64]:
         """Information of a window without that of its prior."""
         return _positive_part(np.linalg.inv(covariance[block]) - self._information[block])
@@ -236,7 +241,7 @@ def _with_unit(std: Mapping[str, float], errors: Mapping[str, float]) -> dict[st
 
 
 def at_epoch(covariance: NDArray[np.float64], later: float) -> NDArray[np.float64]:
-    """Return the covariance (45, 45) with the latency at an epoch so much later, s."""
+    """Return the covariance (47, 47) with the latency at an epoch so much later, s."""
     change = np.eye(N_STATES)
     change[SLICES["latency"], SLICES["latency_rate"]] = later
     return np.asarray(change @ covariance @ change.T)
@@ -248,6 +253,14 @@ def named_std(covariance: NDArray[np.float64], frozen: NDArray[np.bool_]) -> dic
     for name in UNIT_STATES:
         std[SLICES[name]] *= REPEATED
     return {name: std[s].tolist() for name, s in SLICES.items() if not frozen[s].all()}
+
+
+def places_of(names: Iterable[str]) -> NDArray[np.bool_]:
+    """Return which entries (47,) are those of the states with these names."""
+    chosen = np.zeros(N_STATES, dtype=bool)
+    for name in names:
+        chosen[SLICES[name]] = True
+    return chosen
 
 
 def _frozen_names(frozen: Iterable[str], *, has_imu: bool, has_motor: bool) -> set[str]:

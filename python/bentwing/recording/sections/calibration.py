@@ -15,6 +15,8 @@ STD_UNITS = {
     "latency": "s",
     "extrinsic_rotation": "rad",
     "extrinsic_translation": "m",
+    "range_offset": "m",
+    "range_grazing": "rad",
 }
 
 
@@ -23,8 +25,9 @@ class CalibrationRecord(Section):
 
     `std` are standard deviations by name, in the units of `STD_UNITS`: `motor_tilt` and
     `motor_offset` of the lidar on the motor, about and along the two directions of `motor_across`
-    (motor frame), `encoder_delay`, `encoder_zero`, `latency`, and of `T_imu_motor` or `T_imu_lidar`
-    `extrinsic_rotation` and `extrinsic_translation`.
+    (motor frame), `encoder_delay`, `encoder_zero`, `latency`, of `T_imu_motor` or `T_imu_lidar`
+    `extrinsic_rotation` and `extrinsic_translation`, and of `lidar.ranges` `range_offset` and
+    `range_grazing`.
     """
 
     std: dict[str, tuple[NonNegative, ...]] = Field(default_factory=dict)

@@ -11,6 +11,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 from bentwing.base.units import Unit
 from bentwing.recording.lidar_kinds import KIND_DEFAULTS, LidarKind, VelodyneModel
 from bentwing.recording.sections.beams import Beams
+from bentwing.recording.sections.ranges import Ranges
 from bentwing.recording.sections.section import NonNegative, Offset, Positive, Section, Topic
 
 # s; what is beyond is taken off the stamps when they are read. An estimator follows a latency from
@@ -36,6 +37,7 @@ class Lidar(Section):
     mirrored : its scans run the other way: y of every point is negated
     range_scale : m per unit of the ranges in the recording; 0.001 for millimetres
     beams : by how much each beam of a multi-beam lidar is off; None for not at all
+    ranges : by how much all ranges are too long; estimators start from it
     """
 
     topic: Topic | None = None
@@ -49,6 +51,7 @@ class Lidar(Section):
     mirrored: bool = False
     range_scale: Annotated[Positive, Unit("m per unit of the recording")] = 1.0
     beams: Beams | None = None
+    ranges: Ranges | None = None
 
     @model_validator(mode="before")
     @classmethod

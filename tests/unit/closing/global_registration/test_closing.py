@@ -10,11 +10,12 @@ from bentwing.base import geometry
 from bentwing.base.calibration import Calibration
 from bentwing.base.estimate import Estimate
 from bentwing.base.mount import FixedMount, Pose
+from bentwing.base.range_bias import RangeBias
 from bentwing.base.trajectory import Trajectory
 from bentwing.closing.global_registration import GlobalSettings, close_loops
 from bentwing.closing.localize.map_surfels import SurfelMaker, core_surfels
 from bentwing.odometry.continuous.settings import SurfelSettings
-from bentwing.recording import LidarBatch, Payload
+from bentwing.recording import ImuBatch, LidarBatch, Payload
 
 PAYLOAD = Payload.model_validate(
     {"T_imu_lidar": {}, "lidar": {"range_sigma": 1e-3}}
@@ -47,6 +48,40 @@ def scans(start=0.0, stop=SECONDS):
         seen = np.where(np.abs(seen) < 1e-9, 1e-9, seen)
         far = np.where(seen > 0, ROOM[:, 1] - positions, ROOM[:, 0] - positions) / seen
         yield LidarBatch(rays * far.min(axis=1)[:, None], times)
+
+
+def inertial(stop=SECONDS):
+    """What an ideal IMU feels on that trajectory, whose rate is constant."""
+    times = np.arange(0.0, stop, 0.005)
+    s = 2 * np.pi / LAP
+    waves = np.array([1.0, 0.8, 0.2]) * np.array([1.0, 1.0, 4.0]) * s**2
+    phases = s * times
+    shapes = np.stack([np.cos(phases), np.sin(phases), np.sin(2 * phases)], axis=1)
+    force = np.array([0.0, 0.0, 9.8]) - waves * shapes
+    felt = geometry.rotate(geometry.inverse(poses(times)[1]), force)
+    yield ImuBatch(times, np.tile([0.1, 0.2, 5.0], (len(times), 1)), felt)
+
+
+def wrong_ranges(offset, stop=SECONDS):
+    """The same scans with ranges that are too long."""
+    for batch in scans(0.0, stop):
+        far = np.linalg.norm(batch.points, axis=1)[:, None]
+        yield replace(batch, points=batch.points * (1.0 + offset / far))
+
+
+def closed_with_imu(offset, **settings):
+    """What becomes of the exact trajectory, of an estimate with an IMU, if ranges are too long."""
+    given = estimate(truth(0.0, 20.0))
+    calibration = replace(
+        given.calibration, std={"gyro_bias": [1e-4] * 3, "accel_bias": [0.01] * 3}
+    )
+    return close_loops(
+        replace(given, calibration=calibration),
+        [*inertial(20.0), *wrong_ranges(offset, 20.0)],
+        Payload.model_validate({"T_imu_lidar": {}, "imu": {}, "lidar": {"range_sigma": 1e-3}}),
+        settings=GlobalSettings(**settings),
+        threads=2,
+    )
 
 
 def bent(trajectory):
@@ -173,3 +208,35 @@ def test_a_registration_with_a_map_that_fails_does_not_call_the_trajectory_open_
     )
     assert not found.record["applied"]
     assert "not registered with the map" in found.warnings[0]
+
+
+def test_ranges_that_are_too_long_are_found_and_exact_ones_left_bit_for_bit():
+    found = closed_with_imu(0.025)
+    assert found.record["applied"], found.record
+    calibration = found.estimate.calibration
+    (std,) = calibration.std["range_offset"]
+    assert calibration.ranges.offset == pytest.approx(0.025, abs=1.5e-3)
+    assert std < 2e-3
+    assert calibration.ranges.grazing == 0.0
+    assert "range_grazing" not in calibration.std
+    exact, unasked = (
+        closed_with_imu(0.0, frozen=frozen) for frozen in ((), ("range_offset", "range_grazing"))
+    )
+    assert exact.estimate.calibration.ranges == RangeBias()
+    assert "range_offset" not in exact.estimate.calibration.std
+    for name in ("positions", "quats_xyzw"):
+        assert np.array_equal(
+            getattr(exact.estimate.trajectory, name), getattr(unasked.estimate.trajectory, name)
+        )
+
+
+def test_ranges_stay_as_they_are_where_they_are_frozen_or_there_is_no_imu():
+    frozen = closed_with_imu(0.025, frozen=("range_offset",))
+    assert frozen.estimate.calibration.ranges.offset == 0.0
+    alone = close_loops(estimate(truth()), wrong_ranges(0.025), PAYLOAD, threads=2)
+    assert alone.estimate.calibration.ranges == RangeBias()
+
+
+def test_a_state_that_is_none_cannot_be_frozen():
+    with pytest.raises(ValueError, match="unknown states \\['range_scale'\\]; choose from"):
+        GlobalSettings(frozen=("range_scale",))

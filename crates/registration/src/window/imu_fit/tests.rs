@@ -96,6 +96,7 @@ fn fit(fault: &Fault, deviation: [f64; 2], random: &mut Random) -> ImuFit {
             T_imu_base: nalgebra::Isometry3::identity(),
             clock: bentwing_trajectory::LidarClock::default(),
             motor: None,
+            ranges: bentwing_trajectory::RangeBias::default(),
         },
         unit,
         gravity: GRAVITY,

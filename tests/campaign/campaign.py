@@ -145,7 +145,8 @@ def _problems(attempt: Attempt, ground: Ground, kind: str) -> Iterator[Ended | s
         yield f"two writers ended with {ended.code} and {[one.code for one in others]}"
     if attempt.out is not None:
         yield from _of_result(attempt.out, ground, kind, ended)
-    if attempt.again is not None:
+    is_done = ended.code == 0 and attempt.command[0] == "simulate"  # it replaces no recording
+    if attempt.again is not None and not is_done:
         if attempt.before_again is not None:
             attempt.before_again()
         again = run(attempt.again, longest=longest)

@@ -67,7 +67,9 @@ impl<'a> Placer<'a> {
             let chunk = c * CHUNK..c * CHUNK + placed.len();
             let (points, times) = (&points[chunk.clone()], &times[chunk.clone()]);
             let turned: Vec<[f64; 3]>;
-            let points = if !self.head.takes_points_as_measured() {
+            let points = if self.head.takes_points_as_measured() {
+                points
+            } else {
                 let angle = |i: usize| angles.get(i).copied().unwrap_or(0.0);
                 let in_base = |(p, i): (&[f64; 3], usize)| {
                     let p = Vector3::from(*p);
@@ -75,8 +77,6 @@ impl<'a> Placer<'a> {
                 };
                 turned = points.iter().zip(chunk).map(in_base).collect();
                 &turned
-            } else {
-                points
             };
             // The widest instructions of the machine; the order of operations is the same.
             let placer = self;

@@ -225,8 +225,10 @@ _OF_FIXES = {
 def _georeference(found: Mapping[str, Any] | None) -> str:
     if not found:
         return ""
-    named = {k: found[k] for k in ("epsg", "crs", "heights", "mode") if k in found}
-    facts: dict[str, Any] = {**named}
+    facts: dict[str, Any] = {}
+    if "epsg" in found:
+        facts["coordinate system"] = f"{found['crs']} (EPSG:{found['epsg']})"
+    facts |= {name: found[name] for name in ("heights", "mode") if name in found}
     if "heading" in found:
         facts["heading, ° north of east"] = np.degrees(found["heading"])
     if "std" in found:

@@ -11,7 +11,7 @@ from bentwing.base import geometry
 from bentwing.base.inertial_unit import InertialUnit
 from bentwing.base.trajectory import Trajectory
 from bentwing.evaluate.verdict import Evidence, verdict_of
-from bentwing.report import write_report
+from bentwing.report import page, write_report
 from bentwing.report.calibration import calibration_table
 
 RECORD = {
@@ -220,3 +220,22 @@ def test_names_from_outside_cannot_become_markup(tmp_path):
     text, page = written(tmp_path, run_json=record, map_sample=NO_POINTS)
     assert "script" not in page.counts
     assert evil not in text
+
+
+def test_the_place_on_the_earth_has_its_name_and_the_share_of_each_run():
+    found = {
+        "epsg": 25832, "crs": "ETRS89 / UTM zone 32N", "mode": "rigid",
+        "fixes": {
+            "messages": 220, "fixes": 219, "used": 212, "rejected": 7, "rms_horizontal": 0.012,
+            "runs": [
+                {"name": "morning", "used": 105, "rejected": 4, "offset": [0.001, 0, -0.006]},
+                {"name": "noon", "used": 0, "rejected": 0, "offset": None},
+            ],
+        },
+    }  # fmt: skip
+    shown = page._georeference(found)
+    assert "ETRS89 / UTM zone 32N (EPSG:25832)" in shown
+    assert "GNSS fixes left out" in shown
+    assert "morning" in shown
+    assert "+0.001, +0.000, -0.006" in shown
+    assert "{" not in shown

@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 use bentwing_registration::{Globals, Settings as Registration};
 use bentwing_surfels::{Points, SurfelSet};
-use bentwing_trajectory::{Head, Imu, InertialUnit, LidarClock, Trajectory, so3};
+use bentwing_trajectory::{Head, Imu, InertialUnit, LidarClock, RangeBias, Trajectory, so3};
 pub use chain::chain;
 pub use features::Features;
 pub use window::prior;
@@ -74,6 +74,7 @@ impl Scanner {
                     T_imu_base: self.mount() * Isometry3::identity(),
                     clock: LidarClock::default(),
                     motor: None,
+                    ranges: RangeBias::default(),
                 },
                 unit: InertialUnit::ideal(),
                 gravity: Vector3::z() * GRAVITY,

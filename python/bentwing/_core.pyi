@@ -41,6 +41,7 @@ __all__ = [
     "Surfels",
     "__version__",
     "extract_surfels",
+    "las_records",
     "register_globally",
     "register_window",
     "solve_pose_graph",

@@ -176,7 +176,7 @@ def in_paths(healthy: Healthy, folder: Path, draw: random.Random) -> Attempt:
         "/dev/full",
         "/proc/self/mem",
         folder / "a\nb.bag",
-        os.fsdecode(b"caf\xe9.bag"),
+        os.fsdecode(b"h\xf6hle.bag"),
     ]
     path = draw.choice([path, draw.choice(odd)])
     for suffix in ("laz", "yaml", "txt", "mcap", "pcap", "csv", "json"):

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import os
-import signal
 import subprocess
 import sys
 import tempfile
@@ -67,10 +66,9 @@ def run(
         )
         if meanwhile is not None:
             meanwhile(process)
-        status, peak = _wait(process, started + longest)
+        code, peak = _wait(process, started + longest)
         said.seek(0)
         text = said.read().decode("utf-8", "replace")
-    code = None if status is None else os.waitstatus_to_exitcode(status)
     return Ended(code, text, time.monotonic() - started, peak)
 
 
@@ -82,18 +80,15 @@ def _limit(limits: Sequence[tuple[str, int]]) -> None:
 
 
 def _wait(process: subprocess.Popen[bytes], until: float) -> tuple[int | None, float]:
-    """Return the status of a process and its peak in MB; kill it at the end of its time."""
+    """Return the exit code of a process and its peak in MB; kill it at the end of its time."""
     peak = 0.0
     while time.monotonic() < until:
         peak = max(peak, _peak_mb(process.pid))
-        pid, status = os.waitpid(process.pid, os.WNOHANG)
-        if pid:
-            process.returncode = os.waitstatus_to_exitcode(status)
-            return status, peak
+        if (code := process.poll()) is not None:
+            return code, peak
         time.sleep(0.02)
-    process.send_signal(signal.SIGKILL)
-    os.waitpid(process.pid, 0)
-    process.returncode = -signal.SIGKILL
+    process.kill()
+    process.wait()
     return None, peak
 
 

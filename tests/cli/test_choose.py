@@ -190,7 +190,7 @@ def test_settings_reach_the_pipeline(bentwing, called, written, head, command):
     [
         (None, ["--set", "windows=4"], 2, "--set: continuous: unknown key 'windows'; did you mean 'window'?"),
         (None, ["--set", "surfels.n_level=4"], 2, "did you mean 'n_levels'?"),
-        (None, ["--set", "window=-4"], 2, "--set: continuous.window: input should be greater than 0"),
+        (None, ["--set", "window=-4"], 2, "--set: continuous.window: input should be greater than or equal to 0.5"),
         (None, ["--set", "window=long"], 2, "found 'long'"),
         (None, ["--set", "map_format=obj"], 2, "'obj'"),
         ("continuous: {windows: 4}", [], 3, "settings.yaml: continuous: unknown key 'windows'; did you mean"),

@@ -216,8 +216,15 @@ def _found(arrays: dict[str, Any], described: dict[str, Any]) -> Found:
         Reading(**described["reading"]),
         Spin([(time, rate) for time, rate in arrays["spin"].tolist()]),
         **described["corrections"],
-        stage_warnings=tuple(described["stage_warnings"]),
+        stage_warnings=_sentences(described["stage_warnings"]),
         evidence=tuple(Evidence.from_json(one) for one in described.get("evidence") or []),
         set_up=SetUp.from_json(described["set_up"]) if described.get("set_up") else None,
         beams=FoundBeams.from_json(described["beams"]) if described.get("beams") else None,
     )
+
+
+def _sentences(described: object) -> tuple[str, ...]:
+    if not isinstance(described, list) or not all(isinstance(one, str) for one in described):
+        msg = f"warnings: expected sentences, found {described!r:.40}"
+        raise TypeError(msg)
+    return tuple(described)

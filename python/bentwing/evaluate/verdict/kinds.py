@@ -111,7 +111,7 @@ KINDS: dict[str, Kind] = {
         "check its unit, its scale and whether the driver removes gravity",
     ),
     "matches": Kind(
-        5, 3.0, 20.0,
+        5, 4.5, 20.0,
         "{share:.0f} % of the surfaces seen again do not fit the trajectory{when}",
         _HEAD,
     ),

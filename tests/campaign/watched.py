@@ -53,10 +53,12 @@ def run(
     environment : variables besides those of this process
     limits : resources that it may have, by the names of the module `resource`
     """
-    with tempfile.TemporaryFile() as said:
+    # An odd value of an option is the name of a file as well: it must not come into the project.
+    with tempfile.TemporaryFile() as said, tempfile.TemporaryDirectory() as nowhere:
         started = time.monotonic()
         process = subprocess.Popen(
             [sys.executable, "-m", "bentwing", *arguments],
+            cwd=nowhere,
             stdin=subprocess.DEVNULL,
             stdout=said,
             stderr=said,

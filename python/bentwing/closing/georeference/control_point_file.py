@@ -134,20 +134,19 @@ def _control_point(
             return np.nan
 
     name = str(row[columns["id"]]).strip()
-    use = (row[columns["use"]] if "use" in columns else "") or "control"
+    use = ((row[columns["use"]] if "use" in columns else "") or "control").strip().lower()
     position = np.array([value(place) for place in places])
     radius = value("radius") if "radius" in columns else RADIUS
     is_picked = all(key in columns and (row[columns[key]] or "").strip() for key in _PICKED)
     picked = np.array([value(key) for key in _PICKED]) if is_picked else None
     is_known = np.isfinite(position).all() and (picked is None or np.isfinite(picked).all())
-    if not (is_known and 0 < radius < 100) or use.strip().lower() not in _USES:
+    if not (is_known and 0 < radius < 100) or use not in _USES:
         msg = (
             f"{path}: point {name!r} is {dict(row)}; expected numbers for {', '.join(places)}, a radius "
             "in metres, and as use control or check"
         )
         raise InputError(msg)
-    used = "check" if use.strip().lower() == "check" else "control"
-    return ControlPoint(name, position, radius, "check" if used == "check" else "control", picked)
+    return ControlPoint(name, position, radius, "check" if use == "check" else "control", picked)
 
 
 def _require_names(path: Path, names: Sequence[str]) -> None:

@@ -21,7 +21,7 @@ from bentwing.closing.georeference.shares import shares_of
 from bentwing.closing.georeference.site import Site
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -134,6 +134,7 @@ def georeference(
         marks=marks,
         before=before,
         mode=settings.mode,
+        columns={} if listed is None else listed.columns,
     )
 
 
@@ -147,6 +148,7 @@ def _finished(
     marks: Marks | None,
     before: Sequence[float | None],
     mode: str,
+    columns: Mapping[str, str],
 ) -> Georeferenced:
     projection, record = _projected(site, trajectory, placement, reach)
     record["mode"] = mode
@@ -163,6 +165,7 @@ def _finished(
     if marks is not None:
         rows = marks.table(placement, before)
         record["control_points"], record["residuals"] = rows, summary(rows)
+        record["control_point_columns"] = dict(columns)
         warnings += marks.warnings(placement)
     if trajectory is not site.original:
         moved = np.linalg.norm(trajectory.positions - site.original.positions, axis=1)

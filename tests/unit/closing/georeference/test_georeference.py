@@ -250,3 +250,4 @@ def test_marks_in_a_named_system_give_the_map_its_system(tmp_path):
     found = placed(None, control_points=path, epsg=25832)
     assert 'AUTHORITY["EPSG","25832"]' in found.crs_wkt
     assert np.abs(errors(found)).max() < 0.04
+    assert found.record["control_point_columns"]["longitude"] == "lon"

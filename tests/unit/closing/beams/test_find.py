@@ -23,18 +23,18 @@ HALF_ROOM = np.array([7.0, 5.0, 3.0])
 SIGMA = 0.01
 
 
-def _estimate() -> Estimate:
+def _estimate(tilt: float = 0.4) -> Estimate:
     times = np.arange(0.0, SPAN + 0.5, 0.01)
     phase = 2 * np.pi * times / 4.0
     positions = np.column_stack([2.5 * np.sin(phase), 1.5 * np.cos(phase), 0.5 * np.sin(2 * phase)])
-    tilts = np.column_stack([0.4 * np.sin(1.3 * phase), 0.4 * np.cos(0.9 * phase), 0.5 * phase])
+    tilts = np.column_stack([tilt * np.sin(1.3 * phase), tilt * np.cos(0.9 * phase), 0.5 * phase])
     mount = FixedMount(Pose.identity())
     calibration = Calibration(0.0, mount, np.zeros(3), np.zeros(3), np.array([0.0, 0.0, 9.8]))
     return Estimate(Trajectory(times, positions, geometry.exp(tilts)), calibration)
 
 
-def _batch(estimate: Estimate, errors: np.ndarray) -> LidarBatch:
-    """Returns from the walls, recorded without what the beams are off, (B, 4)."""
+def _batch(estimate: Estimate, errors: np.ndarray, bump: float = 0.0) -> LidarBatch:
+    """Returns from walls with bumps, m, recorded without what the beams are off, (B, 4)."""
     rng = np.random.default_rng(7)
     times = np.arange(0.0, SPAN, 1.0 / RATE)
     rings = np.arange(len(times)) % N_BEAMS
@@ -46,6 +46,8 @@ def _batch(estimate: Estimate, errors: np.ndarray) -> LidarBatch:
     rays = geometry.rotate(quats, local)
     starts = positions + geometry.rotate(quats, height[:, None] * np.array([0.0, 0.0, 1.0]))
     ranges = ((np.sign(rays) * HALF_ROOM - starts) / rays).min(axis=1)
+    hits = starts + ranges[:, None] * rays
+    ranges += bump * np.sin(3.0 * hits).prod(axis=1)
     ranges += rng.normal(0.0, SIGMA, len(ranges)) - distance
     recorded = directed(ranges, ELEVATIONS[rings], turned, 0.0)
     return LidarBatch(np.ascontiguousarray(recorded), times, ring=rings.astype(np.uint16))
@@ -89,6 +91,12 @@ def test_two_blocks_of_lasers_at_two_heights_are_found():
 def test_ideal_beams_stay_where_they_are():
     estimate = _estimate()
     assert find_beams(estimate, [_batch(estimate, np.zeros((N_BEAMS, 4)))], _payload()) is None
+
+
+def test_the_bumps_of_a_wall_are_not_errors_of_beams():
+    estimate = _estimate(tilt=0.05)
+    batch = _batch(estimate, np.zeros((N_BEAMS, 4)), bump=0.15)
+    assert find_beams(estimate, [batch], _payload()) is None
 
 
 def test_a_lidar_without_beams_says_nothing():

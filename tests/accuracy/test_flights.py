@@ -137,6 +137,7 @@ def test_expected_errors_are_about_as_large_as_the_true_ones(flight):
     assert expected["horizontal"] < 5 * RANGE_SIGMA
 
 
+@pytest.mark.slow
 def test_the_walls_of_a_cave_are_not_taken_for_errors_of_beams(flown):
     """Where all is rough, beams that seem to begin higher and lower shrink a climb by hundredths."""
     cave = flown("cave", 25.0, head="vlp16-fixed", seed=105)

@@ -63,6 +63,7 @@ def find_beams(estimate: Estimate, batches: Iterable[Batch], payload: Payload) -
             break
     if not are_off(beams):
         return None
+    thickness = _thickness(first, shots, beams)
     beams[(np.abs(beams[:, :2]) > MAX_ANGLE).any(axis=1), :3] = 0.0
     return FoundBeams(
         beams,
@@ -70,7 +71,7 @@ def find_beams(estimate: Estimate, batches: Iterable[Batch], payload: Payload) -
         _table(first),
         cells.n_cells,
         len(cells.chosen),
-        (_roughness(first), _roughness(shots)),
+        thickness,
     )
 
 
@@ -79,6 +80,17 @@ def _table(shots: Shots) -> Array:
     counts = np.maximum(np.bincount(shots.rings, minlength=shots.n_beams), 1)
     table: Array = np.bincount(shots.rings, shots.elevations, shots.n_beams) / counts
     return table
+
+
+def _thickness(recorded: Shots, found: Shots, beams: Array) -> tuple[float, float]:
+    """Return how rough the planes are by the beams as recorded and as found, m.
+
+    What better poses gain is not the beams' doing: those recorded are judged from whichever poses suit
+    them better, those they were recorded with or those that were found.
+    """
+    still = np.zeros((len(found.times), 3))
+    without = found.moved(still, still, -beams)
+    return min(_roughness(recorded), _roughness(without)), _roughness(found)
 
 
 def _roughness(shots: Shots) -> float:

@@ -25,8 +25,8 @@ NAMES = ("elevations", "azimuths", "ranges", "heights")
 LEAST = np.array([np.radians(0.015), np.radians(0.015), 1.5e-3, 5e-3])
 """rad and m; beams that are off by less in the mean are as good as the estimate of them."""
 WORTH = 0.97
-"""Thickness of surfaces with the beams as they were found, as a share of that without: real errors leave 0.4
-to 0.95 of it, what a cave feigns 0.985 and more, and that shrinks a climb by hundredths."""
+"""Thickness of surfaces by the beams that were found, as a share of that by those recorded: real errors leave
+0.4 to 0.96 of it, what a cave feigns 0.985 and more, and that shrinks a climb by hundredths."""
 DIGITS = 6
 
 
@@ -50,7 +50,8 @@ class FoundBeams(Value):
     std : (B, 4) their standard deviations
     table : (B,) rad, elevation of each beam as it is recorded
     n_planes, n_returns : that took part
-    roughness : m, standard deviation of the returns about their planes, before and after
+    roughness : m, standard deviation of the returns about their planes, by the beams as they were
+        recorded and as they were found
     """
 
     offsets: Array

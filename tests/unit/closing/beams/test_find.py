@@ -96,7 +96,8 @@ def test_ideal_beams_stay_where_they_are():
 def test_the_bumps_of_a_wall_are_not_errors_of_beams():
     estimate = _estimate(tilt=0.05)
     batch = _batch(estimate, np.zeros((N_BEAMS, 4)), bump=0.15)
-    assert find_beams(estimate, [batch], _payload()) is None
+    found = find_beams(estimate, [batch], _payload())
+    assert found is None or not found.matters
 
 
 def test_a_lidar_without_beams_says_nothing():

@@ -3,12 +3,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import os
+from pathlib import Path
 
 from bentwing.base.errors import InputError
 
-if TYPE_CHECKING:
-    from pathlib import Path
+
+def resolved(path: Path) -> Path:
+    """Return where a path leads to, also where its links run in a circle.
+
+    `Path.resolve` raises there before Python 3.13.
+    """
+    return Path(os.path.realpath(path))
 
 
 def require_regular(

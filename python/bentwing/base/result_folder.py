@@ -14,6 +14,7 @@ from bentwing.base.errors import UsageError
 from bentwing.base.folder_lock import LOCK, FolderLock
 from bentwing.base.plain import plain
 from bentwing.base.provenance import describe_input, versions
+from bentwing.base.regular_file import resolved
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -122,9 +123,9 @@ class RecordedFolder:
 
 
 def _require_elsewhere(path: Path, names: Iterable[str], inputs: Iterable[Path]) -> None:
-    removed = {path.resolve(), *((path / name).resolve() for name in names)}
+    removed = {resolved(path), *(resolved(path / name) for name in names)}
     for given in inputs:
-        if given.resolve() in removed:
+        if resolved(given) in removed:
             msg = (
                 f"{given}: is read, and would be removed with what {path} holds now; choose another "
                 "folder for the result"

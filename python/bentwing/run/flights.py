@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from bentwing.base.errors import UsageError
 from bentwing.base.progress import Progress, as_progress
+from bentwing.base.regular_file import resolved
 from bentwing.base.run_record import read_record
 from bentwing.run.check import opened
 from bentwing.run.folder import RunFolder
@@ -64,7 +65,7 @@ def map_flights(
         georeferencing=settings.georeferencing,
         threads=settings.threads,
         loop_closure=settings.closing,
-        flights={n: [p.resolve() for p in f] for n, f in zip(names, flights, strict=True)},
+        flights={n: [resolved(p) for p in f] for n, f in zip(names, flights, strict=True)},
     )
     for paths in flights:
         with opened(paths, settings, shown):
@@ -85,9 +86,9 @@ def map_flights(
 
 def flight_names(flights: Sequence[Sequence[Path]]) -> list[str]:
     """Name flights after their files, or after the folders of these where the files do not differ."""
-    stems = [paths[0].resolve().stem for paths in flights]
+    stems = [resolved(paths[0]).stem for paths in flights]
     if len(set(stems)) < len(stems):
-        stems = [paths[0].resolve().parent.name for paths in flights]
+        stems = [resolved(paths[0]).parent.name for paths in flights]
     return distinct_names(stems)
 
 
@@ -105,6 +106,6 @@ def _is_mapped(run: Path, paths: Sequence[Path], settings: RunSettings) -> bool:
     )
     return (
         bool(record.get("complete"))
-        and record.get("recordings") == [str(path.resolve()) for path in paths]
+        and record.get("recordings") == [str(resolved(path)) for path in paths]
         and used == wanted
     )

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from bentwing.base.atomic import write_text
 from bentwing.base.errors import InputError
 from bentwing.base.provenance import describe_input, files_of
+from bentwing.base.regular_file import resolved
 from bentwing.base.result_folder import reason_of
 from bentwing.base.run_record import RECORD, RUN_FOLDER
 from bentwing.run.record import RunRecord
@@ -146,7 +147,7 @@ class RunFolder:
         ----------
         start_ns : what is time zero, ns UTC
         """
-        self.record.recordings = [Path(path).resolve() for path in paths]
+        self.record.recordings = [resolved(Path(path)) for path in paths]
         self.record.start_ns = start_ns
 
     def file(self, name: str) -> Path:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from bentwing.base.errors import UsageError
 from bentwing.base.progress import Progress, as_progress
+from bentwing.base.regular_file import resolved
 from bentwing.closing.georeference.settings import GeoreferenceSettings
 from bentwing.closing.global_registration import Budget
 from bentwing.closing.global_registration.stretches import length_of
@@ -89,7 +90,7 @@ def merge(
         cleaning=cleaning or CleanSettings(),
         georeferencing=georeferencing or GeoreferenceSettings(),
         threads=threads,
-        runs=[Path(run).resolve() for run in runs],
+        runs=[resolved(Path(run)) for run in runs],
     )
     require_coordinates(settings.georeferencing)
     sources = open_sources([Path(run) for run in runs])
@@ -97,7 +98,7 @@ def merge(
     settings = settings.model_copy(update={"georeferencing": wanted})
     is_placed = any(source.payload.gnss is not None for source in sources)
     require_effect(wanted, "these runs", is_placed=is_placed)
-    if any(Path(out).resolve() == source.folder.resolve() for source in sources):
+    if any(resolved(Path(out)) == resolved(source.folder) for source in sources):
         msg = (
             f"{out}: is one of the runs that are to be merged; choose another folder for the result"
         )

@@ -12,6 +12,7 @@ from pydantic import ValidationError
 
 from bentwing.base.errors import InputError, UsageError
 from bentwing.base.provenance import describe_input, files_of
+from bentwing.base.regular_file import resolved
 from bentwing.base.run_record import finished_record, understood
 from bentwing.closing.georeference.settings import GeoreferenceSettings
 from bentwing.recording import Payload, Recording
@@ -90,12 +91,12 @@ def open_sources(folders: Sequence[Path]) -> list[Source]:
         raise UsageError(msg)
     seen: dict[Path, Path] = {}
     for folder in folders:
-        place = folder.resolve()
+        place = resolved(folder)
         if place in seen:
             msg = f"{folder}: is the same run as {seen[place]}; give each run once"
             raise UsageError(msg)
         seen[place] = folder
-    names = distinct_names([folder.resolve().name for folder in folders])
+    names = distinct_names([resolved(folder).name for folder in folders])
     sources = [open_source(f, n) for f, n in zip(folders, names, strict=True)]
     _refuse_same_recording(sources)
     return sources

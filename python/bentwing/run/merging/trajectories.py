@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bentwing.base import geometry
+from bentwing.base.regular_file import resolved
 from bentwing.base.transform import rigid
 
 if TYPE_CHECKING:
@@ -38,7 +39,7 @@ def write_trajectories(
         described.append(
             {
                 "name": source.name,
-                "folder": source.folder.resolve(),
+                "folder": resolved(source.folder),
                 "recordings": source.recordings,
                 "start_ns": source.start_ns,
                 "trajectory": name,

@@ -150,18 +150,20 @@ def test_a_wrong_scale_is_named_with_its_figure(faulted, head, fault, scale, pat
 
 @pytest.mark.parametrize(
     "head",
-    ["hokuyo-spin", *(pytest.param(head, marks=pytest.mark.slow) for head in HEADS[1:3])],
+    ["hokuyo-spin", *(pytest.param(head, marks=pytest.mark.slow) for head in HEADS[1:])],
 )
 def test_no_payload_is_needed(simulated, tmp_path, head):
     folder = simulated("office", 22.0, head=head)
     run = map_recording(folder / "recording.bag", None, tmp_path / "run", map_spacing=0.05)
     assert run.verdict.state == "good"
-    true = Payload.load(folder / "payload.yaml").T_imu_lidar.pose
-    turn = geometry.multiply(
-        geometry.inverse(true.quaternion), run.estimate.calibration.mount.T_imu_lidar.quaternion
-    )
-    assert np.degrees(np.linalg.norm(geometry.log(turn[None]))) < 1.5
     assert score(folder, tmp_path / "run").ate < 0.006
+    mount = run.estimate.calibration.mount
+    if head == "vlp16-motor":
+        # Which turn of the motor is its zero nobody can tell.
+        return
+    true = Payload.load(folder / "payload.yaml").T_imu_lidar.pose
+    turn = geometry.multiply(geometry.inverse(true.quaternion), mount.T_imu_lidar.quaternion)
+    assert np.degrees(np.linalg.norm(geometry.log(turn[None]))) < 1.5
 
 
 def test_a_draft_knows_no_mount(simulated):

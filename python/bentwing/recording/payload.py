@@ -102,7 +102,9 @@ class Payload(Section):
     @property
     def places_lidar_on_imu(self) -> bool:
         """Whether the lidar's pose in the IMU frame is given, fixed or through the encoder."""
-        return self.T_imu_lidar is not None or self.encoder is not None
+        return self.T_imu_lidar is not None or (
+            self.encoder is not None and self.encoder.places_motor
+        )
 
     def T_imu_lidar_matrix(self) -> NDArray[np.float64]:
         """(4, 4) of the fixed mount; the identity where none is given (no IMU)."""

@@ -14,12 +14,14 @@ if TYPE_CHECKING:
 MAX_CLOCK_OFFSET = 10.0  # s between the sensors' clocks; more and they do not share one
 
 
-def mount(imu_topic: str) -> str:
+def mount(imu_topic: str, *, turned: bool) -> str:
     """Return the sentence on an IMU whose place relative to the lidar is not known."""
+    where, pose = "the lidar is on it", "T_imu_lidar"
+    if turned:
+        where, pose = "the motor that turns the lidar is on it", "encoder.T_imu_motor"
     return (
-        f"the recording has an IMU ({imu_topic}), but the payload does not say where the lidar is "
-        "on it: give T_imu_lidar (translation in m, quaternion x y z w), or 'imu: null' to map "
-        "with the lidar alone"
+        f"the recording has an IMU ({imu_topic}), but the payload does not say where {where}: give "
+        f"{pose} (translation in m, quaternion x y z w), or 'imu: null' to map with the lidar alone"
     )
 
 

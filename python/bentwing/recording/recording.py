@@ -114,7 +114,8 @@ class Recording:
         """
         self.strict = True
         if "imu" in self._peeks and not self.payload.places_lidar_on_imu:
-            raise PayloadError(problems.mount(self.imu_topic or ""))
+            turned = self.payload.encoder is not None
+            raise PayloadError(problems.mount(self.imu_topic or "", turned=turned))
         if self.point_times is None:
             raise RecordingError(problems.point_times(self.lidar_topic, self.lidar_type))
         for problem in self.clock_problems():

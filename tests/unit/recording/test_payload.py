@@ -61,6 +61,12 @@ def test_without_a_file_a_generic_lidar_is_assumed():
     assert not payload.places_lidar_on_imu
 
 
+def test_an_encoder_alone_places_no_lidar(tmp_path):
+    assert not load(tmp_path, "encoder: {axis: [0, 0, 1]}").places_lidar_on_imu
+    for pose in ("T_imu_motor", "T_motor_lidar"):
+        assert load(tmp_path, f"encoder: {{{pose}: {{}}}}").places_lidar_on_imu
+
+
 def test_naming_the_imu_or_its_place_describes_an_imu(tmp_path):
     assert load(tmp_path, "imu: {topic: /imu}").describes_imu
     assert load(tmp_path, "T_imu_lidar: {}").describes_imu

@@ -19,7 +19,7 @@ SCAN_HZ, IMU_HZ, N = 40, 100, 100
 def head(*, lidar=None, imu=None, encoder=None):
     """The payload with something said of a sensor."""
     values = {"lidar": lidar or {}, "imu": imu or {}}
-    mount = {"T_imu_lidar": {}} if encoder is None else {"encoder": encoder}
+    mount = {"T_imu_lidar": {}} if encoder is None else {"encoder": {"T_imu_motor": {}} | encoder}
     return Payload.model_validate(values | mount)
 
 

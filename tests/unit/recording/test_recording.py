@@ -134,7 +134,7 @@ def test_batches_hold_about_a_tenth_of_a_second(tmp_path, ros1, head_entries):
 
 def test_encoder_angles_come_out_unwrapped(tmp_path, ros, head_entries):
     path = ros.write(tmp_path / "a.bag", head_entries(ros, encoder=True))
-    payload = Payload(encoder={"topic": "/encoder"})
+    payload = Payload(encoder={"topic": "/encoder", "T_imu_motor": {}})
     (_, _, encoder), recording = read(path, payload)
     times, angles = joined(encoder, "times"), joined(encoder, "angles")
     np.testing.assert_allclose(angles - angles[0], 4.0 * times, atol=1e-9)

@@ -58,7 +58,7 @@ def of(payload: Payload, topics: Sequence[TopicInfo]) -> Iterator[str]:
     if payload.lidar.kind == "generic" and "range_sigma" not in payload.lidar.differing():
         yield _KIND.format(kinds=", ".join(get_args(LidarKind)))
     if payload.encoder is not None:
-        if not payload.encoder.model_fields_set & {"T_imu_motor", "T_motor_lidar"}:
+        if not payload.encoder.places_motor:
             yield _MOTOR
     elif payload.describes_imu and payload.T_imu_lidar is None:
         yield _MOUNT

@@ -217,7 +217,8 @@ def _unknown_plane(recording: Recording) -> str:
 def _mount_defects(recording: Recording, *, has_payload: bool) -> list[str]:
     if recording.imu_topic is None or recording.payload.places_lidar_on_imu or not has_payload:
         return []
-    return [problems.mount(recording.imu_topic)]
+    turned = recording.payload.encoder is not None
+    return [problems.mount(recording.imu_topic, turned=turned)]
 
 
 def _blind(recording: Recording) -> list[str]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bentwing.base import geometry
+from bentwing.base.mount import FixedMount
 from bentwing.calibrate.set_up import axes
 from bentwing.recording.readings import GYRO_FACTORS
 from bentwing.recording.sections.calibration import CalibrationRecord
@@ -17,6 +18,7 @@ from bentwing.recording.sections.section import Transform
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from bentwing.base.mount import MotorMount, Pose
     from bentwing.recording import Payload
     from bentwing.recording.sections.imu import GyroUnit
 
@@ -76,6 +78,25 @@ def with_shift(payload: Payload, shift: NDArray[np.float64]) -> Payload:
     return _placed(payload, translation=tuple(float(x) for x in shift))
 
 
+def with_mount(payload: Payload, mount: FixedMount | MotorMount) -> Payload:
+    """Return the payload with another pose of the lidar, or of its motor and of it on that."""
+    if isinstance(mount, FixedMount):
+        return payload.model_copy(update={"T_imu_lidar": _transform(mount.T_imu_lidar)})
+    return with_encoder(
+        payload,
+        T_imu_motor=_transform(mount.T_imu_motor),
+        T_motor_lidar=_transform(mount.T_motor_lidar),
+        zero=mount.encoder_zero,
+    )
+
+
+def _transform(pose: Pose) -> Transform:
+    return Transform(
+        translation=tuple(float(x) for x in pose.translation),
+        quaternion=tuple(float(x) for x in pose.quaternion),
+    )
+
+
 def _placed(payload: Payload, **changes: tuple[float, ...]) -> Payload:
     if payload.encoder is not None:
         return with_encoder(
@@ -88,7 +109,7 @@ def _placed(payload: Payload, **changes: tuple[float, ...]) -> Payload:
 def with_std(payload: Payload, **std: float) -> Payload:
     """Return the payload with standard deviations of what it says of lidar and mount."""
     known = payload.calibration or CalibrationRecord()
-    sizes = {"latency": 1}
+    sizes = {"latency": 1, "motor_tilt": 2, "motor_offset": 2}
     named = {name: (value,) * sizes.get(name, 3) for name, value in std.items()}
     return payload.model_copy(
         update={"calibration": known.model_copy(update={"std": known.std | named})}

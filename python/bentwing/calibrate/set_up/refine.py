@@ -6,16 +6,14 @@ from __future__ import annotations
 from functools import cache
 from typing import TYPE_CHECKING
 
-from bentwing.base.mount import FixedMount
+from bentwing.base.mount import MotorMount
 from bentwing.calibrate.set_up import edits
 from bentwing.calibrate.set_up.noise import ImuNoise
 from bentwing.calibrate.set_up.scales import require_scale_of_ranges
 from bentwing.calibrate.set_up.trial import richest, try_payload
-from bentwing.recording.sections.section import Transform
 
 if TYPE_CHECKING:
     from bentwing.base.calibration import Calibration
-    from bentwing.base.mount import Pose
     from bentwing.calibrate.set_up.stretch import Stretch
     from bentwing.calibrate.set_up.trial import Trial
     from bentwing.recording import Payload
@@ -41,6 +39,8 @@ class Refinement:
         wide = edits.with_std(payload, latency=FOUND_LATENCY, extrinsic_rotation=FOUND_ROTATION)
         if not has_mount:
             wide = edits.with_std(wide, extrinsic_translation=UNKNOWN_SHIFT)
+        if not has_mount and payload.encoder is not None:
+            wide = edits.with_std(wide, motor_tilt=FOUND_ROTATION, motor_offset=UNKNOWN_SHIFT)
         read = stretch.read_as(wide)
         self._payload, self._has_mount = payload, has_mount
         self._stretch, self._threads = stretch, threads
@@ -67,16 +67,11 @@ class Refinement:
         trial = self.trial
         if not trial.is_consistent or trial.calibration is None:
             return None
-        mount = trial.calibration.mount
         found = edits.with_latency(self._payload, trial.calibration.source_latency)
         if not self._has_mount:
             # What little was seen leaves of it is still to be found.
             found = edits.with_std(found, **_std(trial.calibration))
-        if isinstance(mount, FixedMount):
-            return found.model_copy(update={"T_imu_lidar": _transform(mount.T_imu_lidar)})
-        return edits.with_encoder(
-            found, T_imu_motor=_transform(mount.T_imu_motor), zero=mount.encoder_zero
-        )
+        return edits.with_mount(found, trial.calibration.mount)
 
     def _tried_with(self, scale: float) -> Trial:
         lidar = self._wide.lidar
@@ -86,12 +81,7 @@ class Refinement:
 
 
 def _std(found: Calibration) -> dict[str, float]:
-    names = ("extrinsic_rotation", "extrinsic_translation")
+    names = ["extrinsic_rotation", "extrinsic_translation"]
+    if isinstance(found.mount, MotorMount):
+        names += ["motor_tilt", "motor_offset"]
     return {name: CAUTION * max(found.std[name]) for name in names}
-
-
-def _transform(pose: Pose) -> Transform:
-    return Transform(
-        translation=tuple(float(x) for x in pose.translation),
-        quaternion=tuple(float(x) for x in pose.quaternion),
-    )

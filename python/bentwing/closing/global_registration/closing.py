@@ -235,6 +235,8 @@ def _piece(stretches: Stretches, recorded: Recorded, frozen: Iterable[str]) -> _
         has_motor=isinstance(estimate.calibration.mount, MotorMount),
         moving=True,
         frozen={*known, *frozen, "gravity"},
+        # Of a mount that no payload describes the open loop may have left much to be found.
+        stated={name: tuple(std) for name, std in estimate.calibration.std.items()},
     )
     return _core.Piece(
         core_samples(stretches.trajectory),

@@ -66,7 +66,9 @@ INITIAL_STD = {
     "range_grazing": 7e-4,
 }
 # States of which a payload may state that they are less certain.
-DESCRIBED = ("latency", "extrinsic_rotation", "extrinsic_translation")
+DESCRIBED = (
+    "latency", "extrinsic_rotation", "extrinsic_translation", "motor_tilt", "motor_offset",
+)  # fmt: skip
 MOVING_START_STD = {"gyro_bias": 0.01, "accel_bias": 0.05, "gravity": 0.2}
 # Random walks, per √s: clocks drift, mounts give way and warm up. In ten minutes 0.25 ms, 0.006° and
 # half a millimetre: no model is right to less.

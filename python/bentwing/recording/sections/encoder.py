@@ -51,6 +51,11 @@ class Encoder(Section):
     T_motor_lidar: Transform = Transform()
     delay: Offset = 0.0
 
+    @property
+    def places_motor(self) -> bool:
+        """Whether the motor's pose on the IMU, or the lidar's on the motor, is given."""
+        return bool(self.model_fields_set & {"T_imu_motor", "T_motor_lidar"})
+
     @field_validator("axis")
     @classmethod
     def _unit_axis(cls, value: Vector) -> Vector:

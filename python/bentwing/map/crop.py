@@ -12,6 +12,7 @@ import numpy as np
 from bentwing.base.arguments import finite_array
 from bentwing.base.search_tree import nearest
 from bentwing.base.value import Value
+from bentwing.base.voxels import by_key, cells_of, centres_of, pack
 from bentwing.map.polygon import Polygon, contained
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
     Span = tuple[float, float]
 
+_CELL = 0.05  # of the distance
 _PATH_STEP = 0.02  # of the distance: a path that is thinned so is 5e-5 of it too far at most
 
 
@@ -143,9 +145,29 @@ class Cropper:
             keep[left] = contained(crop.polygons, points[left, :2])
         if crop.within is not None:
             left = np.flatnonzero(keep)
-            distances, _ = nearest(self._tree, points[left], [1], crop.within)
-            keep[left] = np.isfinite(distances[:, 0])
+            keep[left] = self._is_near(points[left], crop.within)
         return keep
+
+    def _is_near(self, points: Array, limit: float) -> NDArray[np.bool_]:
+        """Whether each of points (N, 3) is within a limit of the path.
+
+        Cells say it of most points at once: those whose centre is so near, or so far, that all of a cell is.
+        """
+        edge = limit * _CELL
+        cells = cells_of(points, edge)
+        order, starts = by_key(pack(cells))
+        distances = self._distances(centres_of(cells[order[starts]], edge), 2 * limit)
+        lengths = np.diff(np.append(starts, len(order)))
+        of_points = np.empty(len(points))
+        of_points[order] = np.repeat(distances, lengths)
+        margin = 0.5 * np.sqrt(3.0) * edge * (1.0 + 1e-9)
+        near = of_points <= limit - margin
+        unsure = np.flatnonzero(~near & (of_points <= limit + margin))
+        near[unsure] = self._distances(points[unsure], 2 * limit) <= limit
+        return near
+
+    def _distances(self, points: Array, limit: float) -> Array:
+        return nearest(self._tree, points, [1], limit)[0][:, 0]
 
     @cached_property
     def _tree(self):  # type: ignore[no-untyped-def] # noqa: ANN202 - scipy has no types

@@ -5,6 +5,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from bentwing.base.array_spool import ArraySpool
 from bentwing.base.voxels import by_key
 
@@ -13,7 +15,6 @@ if TYPE_CHECKING:
     from pathlib import Path
     from types import TracebackType
 
-    import numpy as np
     from numpy.typing import NDArray
     from typing_extensions import Self
 
@@ -57,8 +58,7 @@ class Buckets:
             The disk is full.
         """
         order, starts = by_key(keys)
-        for first, last in zip(starts, [*starts[1:], len(order)], strict=True):
-            chosen = order[first:last]
+        for chosen in np.split(order, starts[1:]) if len(order) else ():
             key = int(keys[chosen[0]])
             number = self._spool.add({name: values[chosen] for name, values in columns.items()})
             self._tables.setdefault(key, []).append(number)

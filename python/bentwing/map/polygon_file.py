@@ -127,7 +127,7 @@ def _drawing(path: Path) -> AreaFile:
     except ImportError:
         msg = (
             f"{path}: reading a DXF needs the package ezdxf, which is not installed; run "
-            "`pip install bentwing[dxf]`, or export the area as GeoJSON"
+            "`pip install bentwing[products]`, or export the area as GeoJSON"
         )
         raise UsageError(msg) from None
     try:

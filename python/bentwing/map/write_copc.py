@@ -69,6 +69,7 @@ class CopcWriter(LasWriter):
         # The description of the tree has to be the first record; it is written again at the end.
         header.vlrs.insert(0, _info(self._info(cube, (0, 0))))
         header.vlrs.append(LasZipVlr(record))
+        header.are_points_compressed = True
         header.write_to(file)
         file.flush()
         start = file.tell()

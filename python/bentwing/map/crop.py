@@ -16,7 +16,7 @@ from bentwing.base.voxels import by_key, cells_of, centres_of, pack
 from bentwing.map.polygon import Polygon, contained
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Callable, Generator, Iterable
 
     from numpy.typing import NDArray
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     Span = tuple[float, float]
 
 _CELL = 0.05  # of the distance
-_PATH_STEP = 0.02  # of the distance: a path that is thinned so is 5e-5 of it too far at most
+_PATH_STEP = 0.005  # of the distance: a path that is thinned so is 1e-5 of it too far at most
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,15 +104,17 @@ class Cropper:
     Attributes
     ----------
     crop : what is kept
-    path : (M, 3) m, of the IMU, in the coordinates of the points; needed for `crop.within`
+    path : (M, 3) m, of the IMU; needed for `crop.within`
+    to_path : takes points (N, 3) to the frame of the path
     """
 
     crop: Crop
     path: Array = field(default_factory=lambda: np.empty((0, 3)))
+    to_path: Callable[[Array], Array] = np.asarray
 
     def chunks(
         self, chunks: Iterable[MapChunk], counts: dict[str, int] | None = None
-    ) -> Iterator[MapChunk]:
+    ) -> Generator[MapChunk, None, None]:
         """Keep what is inside.
 
         Parameters
@@ -145,7 +147,7 @@ class Cropper:
             keep[left] = contained(crop.polygons, points[left, :2])
         if crop.within is not None:
             left = np.flatnonzero(keep)
-            keep[left] = self._is_near(points[left], crop.within)
+            keep[left] = self._is_near(self.to_path(points[left]), crop.within)
         return keep
 
     def _is_near(self, points: Array, limit: float) -> NDArray[np.bool_]:
@@ -161,7 +163,7 @@ class Cropper:
         of_points = np.empty(len(points))
         of_points[order] = np.repeat(distances, lengths)
         margin = 0.5 * np.sqrt(3.0) * edge * (1.0 + 1e-9)
-        near = of_points <= limit - margin
+        near: NDArray[np.bool_] = of_points <= limit - margin
         unsure = np.flatnonzero(~near & (of_points <= limit + margin))
         near[unsure] = self._distances(points[unsure], 2 * limit) <= limit
         return near

@@ -15,7 +15,7 @@ from bentwing.base.buckets import Buckets
 from bentwing.base.errors import UsageError
 from bentwing.base.plain import plain
 from bentwing.base.staged_folder import staged_folder
-from bentwing.base.voxels import cells_of, pack, unpack
+from bentwing.base.voxels import cells_of
 from bentwing.map.chunk import MapChunk
 from bentwing.map.writer import open_map
 
@@ -23,11 +23,14 @@ if TYPE_CHECKING:
     from collections.abc import Generator, Iterator
     from pathlib import Path
 
+    from numpy.typing import NDArray
+
     from bentwing.base.geodesy import ProjectedSystem
     from bentwing.base.progress import Progress
 
 MOST_TILES = 10_000
 INDEX_SUFFIX = ".geojson"
+_ROWS = 2**32
 
 
 def write_tiles(
@@ -60,31 +63,37 @@ def write_tiles(
     features = []
     with staged_folder(out, index) as folder, Buckets(folder) as buckets, closing(chunks):
         for chunk in chunks:
-            buckets.add(pack(_tiles_of(chunk, edge)), columns_of(chunk))
+            buckets.add(_keys_of(chunk, edge), columns_of(chunk))
         _require_few(buckets.counts, edge)
         n_points = sum(buckets.counts.values())
         with progress.stage("tiles", n_points, "points") as shown:
             for key, count in buckets.counts.items():
-                x, y, _ = (unpack(np.array([key]))[0] * edge).tolist()
+                x, y = (edge * cell for cell in _cell_of(key))
                 path = folder / f"{out.name}_{x}_{y}.{map_format}"
                 wkt = None if system is None else system.wkt
-                low = high = None
+                low, high = np.inf, -np.inf
                 with open_map(path, map_format, clock_origin_ns, wkt) as writer:
                     for tile in _chunks_of(buckets, key):
                         writer.write(tile)
-                        z = tile.points[:, 2]
-                        low = z.min() if low is None else min(low, z.min())
-                        high = z.max() if high is None else max(high, z.max())
+                        low = min(low, float(tile.points[:, 2].min()))
+                        high = max(high, float(tile.points[:, 2].max()))
                         shown.advance(len(tile))
                 features.append(_feature(path.name, (x, y), edge, count, (low, high)))
         write_text(folder / index, json.dumps(plain(_index(out.name, system, features)), indent=1))
     return n_points
 
 
-def _tiles_of(chunk: MapChunk, edge: int) -> np.ndarray[Any, np.dtype[np.int64]]:
-    cells = cells_of(chunk.points, float(edge))
-    cells[:, 2] = 0
-    return cells
+def _keys_of(chunk: MapChunk, edge: int) -> NDArray[np.int64]:
+    """Return a number for each tile; those of voxels repeat within the reach of northings."""
+    x, y, _ = cells_of(chunk.points, float(edge)).T
+    keys: NDArray[np.int64] = x * _ROWS + (y + _ROWS // 2)
+    return keys
+
+
+def _cell_of(key: int) -> tuple[int, int]:
+    """Return the cell along x and y of a tile."""
+    x, y = divmod(key, _ROWS)
+    return x, y - _ROWS // 2
 
 
 def _chunks_of(buckets: Buckets, key: int) -> Iterator[MapChunk]:
@@ -104,9 +113,9 @@ def _require_few(counts: dict[int, int], edge: int) -> None:
 
 
 def _feature(
-    name: str, corner: tuple[int, int], edge: int, count: int, heights: tuple[Any, Any]
+    name: str, corner: tuple[int, int], edge: int, count: int, heights: tuple[float, float]
 ) -> dict[str, Any]:
-    (x, y), (low, high) = corner, heights
+    (x, y), (low, high) = corner, (round(height, 4) for height in heights)
     ring = [[x, y], [x + edge, y], [x + edge, y + edge], [x, y + edge], [x, y]]
     return {
         "type": "Feature",

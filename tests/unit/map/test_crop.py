@@ -91,8 +91,8 @@ def test_what_is_near_a_path_is_near_one_of_its_poses(seed, within):
     path = np.cumsum(rng.normal(0, 0.1, (300, 3)), axis=0)
     kept = Cropper(Crop(within=within), path).keep(points, np.zeros(len(points)))
     distances = np.linalg.norm(points[:, None] - path, axis=2).min(axis=1)
-    # poses are left out that are nearer to each other than a fiftieth of the limit
-    assert np.all(kept[distances <= within * 0.98])
+    # poses are left out that are nearer to each other than a share of the limit
+    assert np.all(kept[distances <= within * 0.995])
     assert not np.any(kept[distances > within])
 
 

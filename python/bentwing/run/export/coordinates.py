@@ -32,7 +32,7 @@ class Coordinates:
     Attributes
     ----------
     exact : the way to projected coordinates, of a run with fixes of its own
-    linear : the way to those of a prior map or of control points
+    linear : the way to those of a prior map or of control points; of other runs nearly the exact one
     system : the projected system, where it has a name
     """
 
@@ -54,7 +54,7 @@ class Coordinates:
             return cls()
         system = None if placed.get("epsg") is None else ProjectedSystem.of_epsg(placed["epsg"])
         if system is None or "origin" not in placed or record.get("localization"):
-            return cls(linear=coordinates_of_run(placed), system=system)
+            return cls(None, coordinates_of_run(placed), system)
         origin, std = placed["origin"], placed["std"]
         frame = LevelFrame(origin["longitude"], origin["latitude"], origin["height"])
         placement = Placement(
@@ -62,7 +62,8 @@ class Coordinates:
             np.array(placed["translation"], np.float64),
             np.array([std["heading"], *std["translation"]], np.float64),
         )
-        return cls(MapProjection.over(low, high, frame, placement, system), system=system)
+        exact = MapProjection.over(low, high, frame, placement, system)
+        return cls(exact, coordinates_of_run(placed), system)
 
     def written(self, points: Array) -> Array:
         """Coordinates (N, 3) m in the map of points (N, 3) m in the frame of the trajectory."""
@@ -72,8 +73,10 @@ class Coordinates:
 
     def local(self, points: Array) -> Array:
         """Points (N, 3) m in the frame of the trajectory of coordinates (N, 3) m in the map."""
-        if self.exact is not None:
-            return self.exact.to_map(points)
+        return self.nearly_local(points) if self.exact is None else self.exact.to_map(points)
+
+    def nearly_local(self, points: Array) -> Array:
+        """Return the same to some millimetres in 300 m, without pyproj."""
         if self.linear is None:
             return points
         inverse = np.linalg.inv(self.linear.matrix)
@@ -107,9 +110,9 @@ class Coordinates:
             msg = f"EPSG:{epsg} and the frame of the trajectory cannot both be written; give one"
             raise UsageError(msg)
         if local:
-            return Target(None, self.local, _same)
+            return Target(None, self.local, same)
         if epsg is None or (self.system is not None and epsg == self.system.epsg):
-            return Target(self.system, _same, self.written)
+            return Target(self.system, same, self.written)
         own, other = self._system(), ProjectedSystem.of_epsg(epsg)
         return Target(other, lambda p: own.to(other, p), lambda p: own.to(other, self.written(p)))
 
@@ -143,5 +146,6 @@ class Target:
         return None if self.system is None else self.system.wkt
 
 
-def _same(points: Array) -> Array:
+def same(points: Array) -> Array:
+    """Return points as they are."""
     return points

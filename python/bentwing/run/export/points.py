@@ -15,6 +15,7 @@ from bentwing.map.clean import clean
 from bentwing.map.crop import Crop, Cropper
 from bentwing.map.thin import thin
 from bentwing.run.export.area import area_in
+from bentwing.run.export.coordinates import same
 from bentwing.run.mapping import clock_of, in_turn, joined_trajectory, with_own_times
 from bentwing.run.settings import SMALLEST_SPACING
 
@@ -102,7 +103,7 @@ class Points:
         target = run.coordinates.target(epsg=wish.epsg, local=wish.local)
         if wish.polygon is not None:
             area = area_in(target, wish.polygon)
-            wish = replace(wish, crop=replace(wish.crop, area=area))
+            wish = replace(wish, crop=replace(wish.crop, area=area), polygon=None)
         stored = run.map_file()
         reason = _why_again(run, wish, stored)
         if reason is None and stored is not None:
@@ -133,27 +134,31 @@ class Points:
         counts : receives what was left out
         """
         counts = {} if counts is None else counts
-        wish, target = self._wish, self.target
-        with self._read(folder, threads, as_progress(progress), counts) as (read, change):
+        wish = self._wish
+        # Distances are those of the ground, which a projection stretches.
+        near, rest = Crop(within=wish.crop.within), replace(wish.crop, within=None)
+        with self._read(folder, threads, as_progress(progress), counts) as (read, change, to_path):
+            if near:
+                read = Cropper(near, self._run.path, to_path).chunks(read, counts)
             moved = (replace(chunk, points=change(chunk.points)) for chunk in read)
-            if wish.crop:
-                path = target.from_local(self._run.path)
-                moved = Cropper(wish.crop, path).chunks(moved, counts)  # type: ignore[assignment]
+            if rest:
+                moved = Cropper(rest).chunks(moved, counts)
             kept = thin(moved, self._run.spacing if wish.spacing is None else wish.spacing, counts)
             yield from kept
 
     @contextmanager
     def _read(
         self, folder: Path, threads: int | None, progress: Progress, counts: dict[str, int]
-    ) -> Iterator[tuple[Iterator[MapChunk], Change]]:
+    ) -> Iterator[tuple[Generator[MapChunk, None, None], Change, Change]]:
+        """Open the source: its points, the way to the export's coordinates and to the path's frame."""
         if isinstance(self._source, list):
             chunks = _again(self._run, self._wish, self._source, folder, threads, progress, counts)
-            yield chunks, self.target.from_local
+            yield chunks, self.target.from_local, same
             return
         stored = self._source
         with progress.stage("export", stored.n_points, "points") as shown:
             read = _shown(stored.chunks(self._run.origin_ns), shown.advance)
-            yield read, self.target.from_map
+            yield read, self.target.from_map, self._run.coordinates.nearly_local
 
 
 def _why_again(run: Finished, wish: Wish, stored: MapFile | None) -> str | None:
@@ -209,7 +214,7 @@ def _again(  # noqa: PLR0917 - private, called once
     threads: int | None,
     progress: Progress,
     counts: dict[str, int],
-) -> Iterator[MapChunk]:
+) -> Generator[MapChunk, None, None]:
     """Read the recordings with the trajectories of the map, and clean their points."""
     points = [s.points(s.estimate, threads=threads, progress=progress) for s in sources]
     _, late = clock_of(points)
@@ -231,7 +236,9 @@ def _duration(sources: list[Source]) -> float:
         return part.length
 
 
-def _shown(chunks: Iterator[MapChunk], advance: Callable[[float], None]) -> Iterator[MapChunk]:
+def _shown(
+    chunks: Iterator[MapChunk], advance: Callable[[float], None]
+) -> Generator[MapChunk, None, None]:
     for chunk in chunks:
         yield chunk
         advance(len(chunk))

@@ -135,7 +135,7 @@ def _kml(name: str, places: NDArray[np.float64], stamps: list[str]) -> str:
 
 def _every(times: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Return the first pose in each step of time, and the last pose."""
-    steps = np.floor((times - times[0]) / _STEP)
+    steps = np.floor((times - times[0]) / _STEP + 1e-6)  # stamps in files are rounded
     chosen = np.append(True, np.diff(steps) > 0)
     chosen[-1] = True
     return chosen

@@ -143,8 +143,16 @@ class Points:
             moved = (replace(chunk, points=change(chunk.points)) for chunk in read)
             if rest:
                 moved = Cropper(rest).chunks(moved, counts)
-            kept = thin(moved, self._run.spacing if wish.spacing is None else wish.spacing, counts)
-            yield from kept
+            yield from thin(moved, self._spacing(), counts)
+
+    def _spacing(self) -> float:
+        """Return the edge of the voxels to thin with; a map is not thinned twice with the same ones.
+
+        Its coordinates are rounded, and two points next to a border would share a voxel then.
+        """
+        own = self._run.spacing
+        wanted = own if self._wish.spacing is None else self._wish.spacing
+        return 0.0 if wanted == own and not isinstance(self._source, list) else wanted
 
     @contextmanager
     def _read(

@@ -112,7 +112,9 @@ impl LazCompressor {
             return Err(PyValueError::new_err(message));
         }
         let n_points = bytes.len() / self.point_size;
-        let announced = counts.iter().try_fold(0_usize, |n, count| n.checked_add(*count));
+        let announced = counts
+            .iter()
+            .try_fold(0_usize, |n, count| n.checked_add(*count));
         let is_whole = bytes.len().is_multiple_of(self.point_size);
         if counts.contains(&0) || announced != Some(n_points) || !is_whole {
             let message = format!("counts: expected numbers above 0 of {n_points} points in all");

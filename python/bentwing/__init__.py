@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from bentwing.odometry.window_result import WindowResult
     from bentwing.recording.payload import Payload
     from bentwing.recording.recording import Recording
+    from bentwing.run.export.export import Exported, export, export_points
     from bentwing.run.merging.runs import Merged, merge
     from bentwing.run.pipeline import map_recording
     from bentwing.run.run import Run
@@ -80,6 +81,7 @@ else:
             "odometry.window_result": ["WindowResult"],
             "recording.payload": ["Payload"],
             "recording.recording": ["Recording"],
+            "run.export.export": ["Exported", "export", "export_points"],
             "run.merging.runs": ["Merged", "merge"],
             "run.pipeline": ["map_recording"],
             "run.run": ["Run"],
@@ -114,6 +116,7 @@ __all__ = [
     "DivergedError",
     "Estimate",
     "EstimationError",
+    "Exported",
     "FixedMount",
     "InertialUnit",
     "InputError",
@@ -136,6 +139,8 @@ __all__ = [
     "WindowRecord",
     "WindowResult",
     "__version__",
+    "export",
+    "export_points",
     "map_recording",
     "merge",
     "read_tum",

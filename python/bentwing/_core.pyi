@@ -107,9 +107,12 @@ class LazCompressor:
     ----------
     point_format : 0 to 10, of the LAS specification
     n_extra_bytes : size of the extra dimensions of a point
+    own_chunks : whether chunks are as large as `compress_chunks` says, else all are of one size
     """
 
-    def __new__(cls, point_format: int, n_extra_bytes: int) -> LazCompressor: ...
+    def __new__(
+        cls, point_format: int, n_extra_bytes: int, *, own_chunks: bool = False
+    ) -> LazCompressor: ...
     def record_data(self) -> bytes:
         """Return the record that the header of the file must announce."""
 
@@ -118,6 +121,11 @@ class LazCompressor:
 
     def compress(self, points: NDArray[np.uint8], *, threads: int = 0) -> None:
         """Append points, record after record as LAS has them (N · size of a point,)."""
+
+    def compress_chunks(
+        self, points: NDArray[np.uint8], counts: Sequence[int], *, threads: int = 0
+    ) -> None:
+        """Append points as one chunk for each of `counts`, none of which is 0."""
 
     def finish(self, *, threads: int = 0) -> None:
         """Write what is held back and the table of chunks."""

@@ -7,6 +7,7 @@ import io
 from typing import TYPE_CHECKING
 
 import laspy
+import lazrs
 import numpy as np
 import pytest
 
@@ -83,3 +84,39 @@ def test_an_unknown_point_format_is_refused() -> None:
 def test_a_missing_file_is_an_os_error(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError):
         _core.LazCompressor(6, 0).begin(tmp_path / "missing", 0)
+
+
+def test_chunks_have_the_sizes_they_are_given(tmp_path: Path) -> None:
+    path, counts = tmp_path / "points", [3, 1, 500]
+    path.touch()
+    points = np.random.default_rng(0).integers(0, 255, (sum(counts), 30)).astype(np.uint8)
+    laz = _core.LazCompressor(6, 0, own_chunks=True)
+    laz.begin(path, 0)
+    laz.compress_chunks(points[:4].ravel(), counts[:2])
+    laz.compress_chunks(points[4:].ravel(), counts[2:], threads=1)
+    laz.finish()
+    with path.open("rb") as file:
+        chunks = lazrs.read_chunk_table(file, lazrs.LazVlr(laz.record_data()))
+    assert [n for n, _ in chunks] == counts
+
+
+@pytest.mark.parametrize("counts", [[3], [0, 2], [2**63, 2**63, 2], []])
+def test_counts_that_are_not_those_of_the_points_are_refused(
+    tmp_path: Path, counts: list[int]
+) -> None:
+    (tmp_path / "points").touch()
+    laz = _core.LazCompressor(6, 0, own_chunks=True)
+    laz.begin(tmp_path / "points", 0)
+    with pytest.raises(ValueError, match="counts"):
+        laz.compress_chunks(np.zeros(2 * 30, np.uint8), counts)
+
+
+def test_a_file_has_chunks_of_one_size_or_of_its_own(tmp_path: Path) -> None:
+    (tmp_path / "points").touch()
+    own, one = _core.LazCompressor(6, 0, own_chunks=True), _core.LazCompressor(6, 0)
+    for laz in (own, one):
+        laz.begin(tmp_path / "points", 0)
+    with pytest.raises(ValueError, match="compress_chunks"):
+        own.compress(np.zeros(30, np.uint8))
+    with pytest.raises(ValueError, match=r"compress\(\)"):
+        one.compress_chunks(np.zeros(30, np.uint8), [1])

@@ -29,10 +29,16 @@ pub(crate) struct LazCompressor {
 #[pymethods]
 impl LazCompressor {
     #[new]
-    fn new(point_format: u8, n_extra_bytes: u16) -> PyResult<Self> {
+    #[pyo3(signature = (point_format, n_extra_bytes, *, own_chunks=false))]
+    fn new(point_format: u8, n_extra_bytes: u16, own_chunks: bool) -> PyResult<Self> {
         let items = LazItemRecordBuilder::default_for_point_format_id(point_format, n_extra_bytes);
         let items = items.map_err(|e| PyValueError::new_err(format!("point_format: {e}")))?;
-        let vlr = LazVlrBuilder::new(items).build();
+        let builder = LazVlrBuilder::new(items);
+        let vlr = if own_chunks {
+            builder.with_variable_chunk_size().build()
+        } else {
+            builder.build()
+        };
         let point_size = vlr.items_size() as usize;
         Ok(Self {
             vlr,
@@ -67,6 +73,10 @@ impl LazCompressor {
         threads: usize,
     ) -> PyResult<()> {
         let bytes = points.as_slice()?;
+        if self.vlr.uses_variable_size_chunks() {
+            let message = "the file has chunks of its own sizes, give them to compress_chunks()";
+            return Err(PyValueError::new_err(message));
+        }
         if !bytes.len().is_multiple_of(self.point_size) {
             let message = format!(
                 "points: expected a multiple of {} bytes, got {}",
@@ -87,12 +97,48 @@ impl LazCompressor {
         in_pool(py, threads, work)?.map_err(io_error)
     }
 
+    /// Appends points as one chunk for each of `counts`, beside each other.
+    #[pyo3(signature = (points, counts, *, threads=0))]
+    fn compress_chunks(
+        &mut self,
+        py: Python<'_>,
+        points: PyReadonlyArray1<'_, u8>,
+        counts: Vec<usize>,
+        threads: usize,
+    ) -> PyResult<()> {
+        let bytes = points.as_slice()?;
+        if !self.vlr.uses_variable_size_chunks() {
+            let message = "the file has chunks of one size, give the points to compress()";
+            return Err(PyValueError::new_err(message));
+        }
+        let n_points = bytes.len() / self.point_size;
+        let announced = counts
+            .iter()
+            .try_fold(0_usize, |n, count| n.checked_add(*count));
+        let is_whole = bytes.len().is_multiple_of(self.point_size);
+        if counts.contains(&0) || announced != Some(n_points) || !is_whole {
+            let message = format!("counts: expected numbers above 0 of {n_points} points in all");
+            return Err(PyValueError::new_err(message));
+        }
+        let mut rest = bytes;
+        let mut chunks = Vec::with_capacity(counts.len());
+        for count in counts {
+            let (chunk, behind) = rest.split_at(count * self.point_size);
+            chunks.push(chunk);
+            rest = behind;
+        }
+        let file = begun(&mut self.file)?;
+        in_pool(py, threads, || file.compress_chunks(chunks))?.map_err(io_error)
+    }
+
     /// Writes what is held back and the table of chunks.
     #[pyo3(signature = (*, threads=0))]
     fn finish(&mut self, py: Python<'_>, threads: usize) -> PyResult<()> {
         let (file, waiting) = (begun(&mut self.file)?, &mut self.waiting);
         let work = || {
-            file.compress_many(waiting).map_err(LasZipError::IoError)?;
+            if !waiting.is_empty() {
+                file.compress_many(waiting).map_err(LasZipError::IoError)?;
+            }
             file.done()
         };
         in_pool(py, threads, work)?.map_err(os_error)?;

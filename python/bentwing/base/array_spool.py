@@ -20,7 +20,7 @@ import numpy as np
 from bentwing.base.atomic import TEMPORARY_SUFFIX
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator, Mapping, Sequence
     from pathlib import Path
     from types import TracebackType
 
@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from typing_extensions import Self
 
     _Layout = tuple[tuple[str, np.dtype[Any], tuple[int, ...]], ...]
+
+_N_PER_TABLE = 3  # numbers that are kept
 
 
 class ArraySpool:
@@ -50,7 +52,7 @@ class ArraySpool:
         self._file: Any = io.BytesIO()
         self._most = self._n_bytes = 0
         self._layouts: dict[_Layout, int] = {}
-        self._tables = array("q")  # layout and rows of each
+        self._tables = array("q")  # layout, rows and first byte of each
         self._lock = Lock()
 
     def __enter__(self) -> Self:
@@ -64,8 +66,8 @@ class ArraySpool:
     ) -> None:
         self.close()
 
-    def add(self, columns: Mapping[str, NDArray[Any]]) -> None:
-        """Append a table; all columns have as many rows.
+    def add(self, columns: Mapping[str, NDArray[Any]]) -> int:
+        """Append a table, all of whose columns have as many rows; return its number.
 
         Raises
         ------
@@ -83,17 +85,26 @@ class ArraySpool:
             self._file.flush()  # what does not fit is to be known now
         except OSError as error:  # which names no file, as this one may have no name
             raise OSError(error.errno, error.strerror, str(self._folder)) from error
-        self._n_bytes += n_bytes
         n_rows = len(ordered[0][1]) if ordered else 0
-        self._tables.extend((self._layouts.setdefault(layout, len(self._layouts)), n_rows))
+        kind = self._layouts.setdefault(layout, len(self._layouts))
+        self._tables.extend((kind, n_rows, self._n_bytes))
+        self._n_bytes += n_bytes
+        return len(self._tables) // _N_PER_TABLE - 1
 
-    def tables(self) -> Iterator[dict[str, NDArray[Any]]]:
-        """Yield the tables; several looks may go on at the same time, but none while tables are added."""
-        layouts, offset = list(self._layouts), 0
-        for number, n_rows in zip(self._tables[::2], self._tables[1::2], strict=True):
-            layout = layouts[number]
+    def tables(self, numbers: Sequence[int] | None = None) -> Iterator[dict[str, NDArray[Any]]]:
+        """Yield the tables; several looks may go on at the same time, but none while tables are added.
+
+        Parameters
+        ----------
+        numbers : of those to read, as `add` returned them; default: all
+        """
+        layouts = list(self._layouts)
+        chosen = range(len(self._tables) // _N_PER_TABLE) if numbers is None else numbers
+        for at in chosen:
+            first = at * _N_PER_TABLE
+            kind, n_rows, offset = self._tables[first : first + _N_PER_TABLE]
+            layout = layouts[kind]
             data = self._read(offset, n_rows * sum(_row_size(column) for column in layout))
-            offset += len(data)
             yield _columns(data, layout, n_rows)
 
     def close(self) -> None:

@@ -121,6 +121,16 @@ class ProjectedSystem:
         """Longitudes, latitudes (deg) and heights (N, 3) of easting, northing and height."""
         return _transformed(self.epsg, _GEODETIC, points)
 
+    def to(self, other: ProjectedSystem, points: Array) -> Array:
+        """Return points (N, 3) m of this system in another one.
+
+        Raises
+        ------
+        UsageError
+            If heights of the other one need grid files that are not there.
+        """
+        return _transformed(self.epsg, other.epsg, points)
+
     def factors(self, longitude: float, latitude: float) -> tuple[float, float]:
         """Meridian convergence, deg (from true north to grid north, clockwise), and point scale."""
         import pyproj

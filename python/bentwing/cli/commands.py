@@ -17,6 +17,7 @@ COMMANDS = {
     "map": "Turn a recording into a trajectory, a map and a report.",
     "localize": "Find a recording in a map, and report what has changed.",
     "merge": "Put several runs into one map.",
+    "export": "Write a run's map or trajectory in another form.",
     "info": "Check whether a recording is fit for mapping.",
     "payload": "Write a description of the sensor head to start from.",
     "calibrate": "Calibrate a sensor head: motor, IMU and clocks.",

@@ -6,8 +6,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from bentwing.map.chunk import MapChunk
     from bentwing.map.clean import CleanSettings
+    from bentwing.map.crop import Crop
     from bentwing.map.formats import MAP_FORMATS, MapFormat
+    from bentwing.map.polygon import Polygon
     from bentwing.map.read import MapPart, read_parts, read_points
 else:
     from bentwing.base.lazy import lazy
@@ -15,8 +18,11 @@ else:
     __getattr__, __dir__ = lazy(
         __name__,
         {
+            "map.chunk": ["MapChunk"],
             "map.clean": ["CleanSettings"],
+            "map.crop": ["Crop"],
             "map.formats": ["MAP_FORMATS", "MapFormat"],
+            "map.polygon": ["Polygon"],
             "map.read": ["MapPart", "read_parts", "read_points"],
         },
     )
@@ -24,8 +30,11 @@ else:
 __all__ = [
     "MAP_FORMATS",
     "CleanSettings",
+    "Crop",
+    "MapChunk",
     "MapFormat",
     "MapPart",
+    "Polygon",
     "read_parts",
     "read_points",
 ]

@@ -8,7 +8,7 @@ from typing import Any, Literal, NamedTuple, TypeAlias, get_args
 
 from bentwing.base.errors import UsageError
 
-MapFormat: TypeAlias = Literal["laz", "las", "ply", "pcd", "e57"]
+MapFormat: TypeAlias = Literal["laz", "copc.laz", "las", "ply", "pcd", "e57"]
 MAP_FORMATS: tuple[MapFormat, ...] = get_args(MapFormat)
 MAP_SUFFIXES = tuple(f".{name}" for name in MAP_FORMATS)
 
@@ -23,6 +23,7 @@ class Format(NamedTuple):
 
 FORMATS: dict[MapFormat, Format] = {
     "laz": Format("write_las.LazWriter", "read_las.las_points"),
+    "copc.laz": Format("write_copc.CopcWriter", "read_las.las_points"),
     "las": Format("write_las.LasWriter", "read_las.las_points"),
     "ply": Format("write_ply.PlyWriter", "read_rows.ply_rows"),
     "pcd": Format("write_pcd.PcdWriter", "read_rows.pcd_rows"),

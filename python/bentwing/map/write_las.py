@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 SCALE = 0.0001  # m; 0.05 mm of rounding at most, 214 km in each direction of the offset
 _MAX_INTENSITY = 65_535
 # Type and description (32 characters at most) of what only some maps have.
-_EXTRA: dict[str, tuple[type[np.generic], str]] = {
+EXTRA: dict[str, tuple[type[np.generic], str]] = {
     "ring": (np.uint16, "beam number"),
     "incidence": (np.float32, "deg between beam and normal"),
     "thickness": (np.float32, "m, 1 sigma across the surface"),
@@ -35,7 +35,7 @@ _COLUMNS: dict[str, type[np.generic]] = {
     "times": np.float64,
     "ranges": np.float32,
     "intensity": np.float32,
-    **{name: kind for name, (kind, _) in _EXTRA.items()},
+    **{name: kind for name, (kind, _) in EXTRA.items()},
 }
 
 
@@ -53,8 +53,7 @@ class LasWriter(MapWriter):
         self._gps_origin = adjusted_gps_origin(clock_origin_ns)
 
     def _begin(self, first: MapChunk) -> None:
-        self._header = _header(first, self.crs_wkt)
-        self._intensity_scale = _intensity_scale(first)
+        self._announce(first)
         self._writer = laspy.LasWriter(
             self._temporary.open("wb"),
             self._header,
@@ -62,22 +61,33 @@ class LasWriter(MapWriter):
             laz_backend=LazBackend(self._temporary) if self.compressed else None,
         )
 
+    def _announce(self, first: MapChunk) -> None:
+        """Decide what the records have."""
+        self._header = _header(first, self.crs_wkt)
+        self._intensity_scale = _intensity_scale(first)
+
     def _append(self, chunk: MapChunk) -> None:
+        self._writer.write_points(
+            laspy.PackedPointRecord(self._records(chunk), self._header.point_format)
+        )
+
+    def _records(self, chunk: MapChunk) -> NDArray[np.void]:
+        """Return the records (N,) of a chunk as the file has them."""
         point_format = self._header.point_format
         columns: dict[str, Any] = {
             name: _column(chunk, name, kind) for name, kind in _COLUMNS.items()
         }
         records = _core.las_records(
             np.ascontiguousarray(chunk.points),
-            stored=[name for name in _EXTRA if name in point_format.dimension_names],
+            stored=[name for name in EXTRA if name in point_format.dimension_names],
             offsets=tuple(self._header.offsets.tolist()),
             step=SCALE,
             gps_origin=self._gps_origin,
             intensity_scale=self._intensity_scale,
             **columns,
         )
-        table = records.view(point_format.dtype())
-        self._writer.write_points(laspy.PackedPointRecord(table, point_format))
+        table: NDArray[np.void] = records.view(point_format.dtype())
+        return table
 
     def _finish(self) -> None:
         self._writer.close()
@@ -101,7 +111,7 @@ def _header(first: MapChunk, crs_wkt: str | None) -> laspy.LasHeader:
     header.generating_software = "bentwing"
     header.system_identifier = "bentwing"
     header.add_extra_dim(laspy.ExtraBytesParams("range", np.float32, "m from the lidar"))
-    for name, (kind, description) in _EXTRA.items():
+    for name, (kind, description) in EXTRA.items():
         if getattr(first, name) is not None:
             header.add_extra_dim(laspy.ExtraBytesParams(name, kind, description))
     if crs_wkt is not None:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from bentwing.base.atomic import publish, temporary_name, writing
+from bentwing.base.progress import Progress
 from bentwing.map.chunk import MapChunk
 from bentwing.map.formats import FORMATS, load, require_format
 
@@ -34,6 +35,10 @@ class MapWriter(ABC):
     path : the final name
     clock_origin_ns : absolute time of `times == 0`, ns UTC
     crs_wkt : the coordinate reference system of the points as WKT 1, None for a frame of their own
+
+    Attributes
+    ----------
+    progress : of what is left to do when all points are known; says nothing unless it is set
     """
 
     def __init__(self, path: Path, clock_origin_ns: int, crs_wkt: str | None = None) -> None:
@@ -41,6 +46,7 @@ class MapWriter(ABC):
         self.clock_origin_ns = clock_origin_ns
         self.crs_wkt = crs_wkt
         self.n_points = 0
+        self.progress = Progress()
         self._temporary = temporary_name(path)
         self._open = False
 

@@ -76,10 +76,7 @@ def write_map(
     placed : where the map is on the Earth, or in the coordinates of a prior map
     difference : watches the points for what has changed since a prior map
     """
-    origin_ns = min(source.start_ns for source in sources)
-    offsets = follow_each_other([source.estimate for source in sources])
-    starts = [(source.start_ns - origin_ns) / NS_PER_S for source in sources]
-    late = np.subtract(starts, offsets)
+    origin_ns, late = clock_of(sources)
     path, sample = folder.file(f"map.{settings.map_format}"), MapSample()
     counts: dict[str, int] = {}
     record: dict[str, Any] = {}
@@ -100,8 +97,8 @@ def write_map(
         _open(path, settings, origin_ns, placed) as writer,
     ):
         for chunk in ahead:
-            times = chunk.times + late[chunk.run_id] if late.any() else chunk.times
-            writer.write(replace(chunk, points=_projected(chunk.points, placed), times=times))
+            timed = with_own_times(chunk, late)
+            writer.write(replace(timed, points=_projected(chunk.points, placed)))
     counts["map.written"] = writer.n_points
     points = sample.points
     revisits = revisit_consistency(points, sample.times) if len(points) else None
@@ -113,6 +110,19 @@ def write_map(
         with _open(changed, settings, origin_ns, placed) as writer:
             writer.write(untimed(_projected(points, placed)))
     return WrittenMap(path, counts, record, sample, revisits, difference.record)
+
+
+def clock_of(sources: Sequence[MapSource]) -> tuple[int, NDArray[np.float64]]:
+    """Return time zero of a map, ns UTC, and s by which each run's recording is later than it is shown."""
+    origin_ns = min(source.start_ns for source in sources)
+    offsets = follow_each_other([source.estimate for source in sources])
+    starts = [(source.start_ns - origin_ns) / NS_PER_S for source in sources]
+    return origin_ns, np.subtract(starts, offsets)
+
+
+def with_own_times(chunk: MapChunk, late: NDArray[np.float64]) -> MapChunk:
+    """Give points the times of their recordings, instead of those of runs that follow each other."""
+    return replace(chunk, times=chunk.times + late[chunk.run_id]) if late.any() else chunk
 
 
 def follow_each_other(estimates: Sequence[Estimate]) -> list[float]:

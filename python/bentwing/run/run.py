@@ -115,14 +115,22 @@ def verdict_in(record: Mapping[str, Any]) -> Verdict:
     return Verdict.from_json(described) if described else verdict_of([])
 
 
-def estimate_of(folder: Path, record: Mapping[str, Any]) -> Estimate:
-    """Return the estimate of a complete run from its folder and record."""
-    poses, _ = read_tum(folder / "trajectory.txt", int(record["start_ns"]))
+def estimate_of(
+    folder: Path, record: Mapping[str, Any], trajectory: str = "trajectory.txt"
+) -> Estimate:
+    """Return the estimate of a complete run from its folder and record.
+
+    Parameters
+    ----------
+    record : of the run, or of one of the runs in a merged map
+    trajectory : name of its file
+    """
+    poses, _ = read_tum(folder / trajectory, int(record["start_ns"]))
     spans = record.get("segments") or [[float(poses.times[0]), float(poses.times[-1])]]
     cut = [poses.within([(a - _ROUNDED, b + _ROUNDED)]) for a, b in spans]
     segments = [part for part in cut if len(part.times) > 1]
     if not segments:
-        msg = f"{folder / 'trajectory.txt'}: does not cover the segments in run.json; map it again"
+        msg = f"{folder / trajectory}: does not cover the segments in run.json; map it again"
         raise InputError(msg)
     return Estimate(
         joined(segments, DT),

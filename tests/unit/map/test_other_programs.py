@@ -36,13 +36,13 @@ def part():
 
 def write(path, part):
     system = ProjectedSystem.of_epsg(UTM)
-    with open_map(path, path.suffix[1:], ORIGIN_NS, system.wkt) as writer:
+    with open_map(path, path.name.partition(".")[2], ORIGIN_NS, system.wkt) as writer:
         writer.write(part)
     return path
 
 
 @pytest.mark.skipif(shutil.which("pdal") is None, reason="PDAL is not installed")
-@pytest.mark.parametrize("kind", ["laz", "las"])
+@pytest.mark.parametrize("kind", ["laz", "copc.laz", "las"])
 def test_pdal_agrees_on_count_times_system_and_every_point(tmp_path, part, kind):
     """As text with nine decimals: `pdal info` prints ten digits, too few for metres of UTM."""
     path = write(tmp_path / f"map.{kind}", part)
@@ -59,6 +59,7 @@ def test_pdal_agrees_on_count_times_system_and_every_point(tmp_path, part, kind)
     pdal("translate", str(path), str(text), order, "--writers.text.precision=9",
          "--writers.text.keep_unspecified=false")  # fmt: skip
     read = np.loadtxt(text, delimiter=",", skiprows=1)
+    read = read[np.argsort(read[:, 3], kind="stable")]  # COPC has an order of its own
     np.testing.assert_allclose(read[:, :3], part.points, rtol=0, atol=1e-4)
     times = adjusted_gps_origin(ORIGIN_NS) + part.times
     np.testing.assert_allclose(read[:, 3], times, rtol=0, atol=1e-6)
@@ -67,14 +68,27 @@ def test_pdal_agrees_on_count_times_system_and_every_point(tmp_path, part, kind)
     np.testing.assert_allclose(read[:, 6], part.thickness, rtol=0, atol=5e-4)
 
 
-def test_laszip_agrees_on_every_point(tmp_path, part):
+@pytest.mark.skipif(shutil.which("pdal") is None, reason="PDAL is not installed")
+def test_pdal_finds_the_points_in_a_box_of_an_octree(tmp_path, part):
+    path, text = write(tmp_path / "map.copc.laz", part), tmp_path / "box.txt"
+    low, high = SHIFT + np.array([[-5, -10, -30], [12, 0, 3]])
+    bounds = str(tuple([float(a), float(b)] for a, b in zip(low, high, strict=True)))
+    command = ["pdal", "translate", str(path), str(text), f"--readers.copc.bounds={bounds}"]
+    subprocess.run(command, check=True, capture_output=True)
+    inside = np.all((part.points >= low) & (part.points <= high), axis=1)
+    assert len(np.loadtxt(text, delimiter=",", skiprows=1)) == np.count_nonzero(inside)
+
+
+@pytest.mark.parametrize("kind", ["laz", "copc.laz"])
+def test_laszip_agrees_on_every_point(tmp_path, part, kind):
     """The original library, instead of the one whose compressor we use."""
     pytest.importorskip("laszip", reason="laszip is not installed")
     import laspy
 
-    path = write(tmp_path / "map.laz", part)
+    path = write(tmp_path / f"map.{kind}", part)
     las = laspy.read(path, laz_backend=laspy.LazBackend.Laszip)
     assert len(las) == N
+    las.points = las.points[np.argsort(las.gps_time, kind="stable")]
     assert np.abs(las.xyz - part.points).max() < 1e-4
     assert np.array_equal(las["range"], part.ranges)
     assert np.allclose(las.gps_time, adjusted_gps_origin(ORIGIN_NS) + part.times, atol=1e-7)

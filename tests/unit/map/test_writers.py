@@ -19,7 +19,13 @@ from bentwing.map.writer import MapWriter, open_map
 
 ORIGIN_NS = 1_700_000_000_123_456_789
 READABLE = [name for name, entry in FORMATS.items() if entry.package is None]
-WORST = {"laz": 5.1e-5, "las": 5.1e-5, "ply": 0.0, "pcd": 4e-6}  # m, of points within 60 m
+WORST = {
+    "laz": 5.1e-5,
+    "copc.laz": 5.1e-5,
+    "las": 5.1e-5,
+    "ply": 0.0,
+    "pcd": 4e-6,
+}  # m, of points within 60 m
 
 
 def chunk(n, seed=0, **without):
@@ -45,8 +51,10 @@ def written(path, map_format, *chunks):
 def test_points_come_back_from_every_format(tmp_path, map_format):
     parts = [chunk(1000, 0), chunk(1, 1), chunk(345, 2)]
     path = written(tmp_path / f"map.{map_format}", map_format, *parts)
-    expected = np.concatenate([part.points for part in parts])
-    assert np.abs(read_points(path) - expected).max() <= WORST[map_format]
+    found, expected = read_points(path), np.concatenate([part.points for part in parts])
+    if map_format == "copc.laz":  # which has an order of its own
+        found, expected = (p[np.argsort(p[:, 0])] for p in (found, expected))
+    assert np.abs(found - expected).max() <= WORST[map_format]
 
 
 @pytest.mark.parametrize("map_format", READABLE)

@@ -3,28 +3,25 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from bentwing.base.progress import as_progress
 from bentwing.base.run_record import RUN_FOLDER
 from bentwing.base.trajectory import DT
 from bentwing.closing.global_registration import Recorded, register_jointly
 from bentwing.closing.global_registration.stretches import Stretches
 from bentwing.closing.joining.matches import Match, Part
 from bentwing.evaluate.verdict import judge_closing, judge_revisits
-from bentwing.map.project import project
 from bentwing.odometry.segments import joined
 from bentwing.run.folder import RunFolder
 from bentwing.run.found import Found
-from bentwing.run.mapping import MapSource, joined_trajectory, write_map
+from bentwing.run.mapping import joined_trajectory, write_map
 from bentwing.run.merging.on_earth import place_on_earth
 from bentwing.run.merging.trajectories import write_trajectories
 from bentwing.run.report import report_run, say_warnings
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator, Mapping, Sequence
+    from collections.abc import Collection, Mapping, Sequence
     from pathlib import Path
 
     from bentwing.base.estimate import Estimate
@@ -32,7 +29,6 @@ if TYPE_CHECKING:
     from bentwing.closing.joining.placing import Placed
     from bentwing.closing.joining.survey import Survey
     from bentwing.evaluate.verdict import Verdict
-    from bentwing.map.chunk import MapChunk
     from bentwing.run.merging.source import Source
     from bentwing.run.settings import MergeSettings
 
@@ -175,7 +171,8 @@ def _one_map(
                 f"other: {result.failure}"
             )
     with folder.stage("georeference"):
-        seen = [_map_source(s, e, found, None) for s, e in zip(sources, estimates, strict=True)]
+        threads = found.settings.threads
+        seen = [s.points(e, threads=threads) for s, e in zip(sources, estimates, strict=True)]
         on_earth = place_on_earth(sources, seen, found.settings.georeferencing)
     estimates = on_earth.estimates
     notes += on_earth.warnings
@@ -183,10 +180,12 @@ def _one_map(
     sigma = max(source.payload.lidar.range_sigma for source in sources)
     with folder.stage("map"):
         runs = write_trajectories(folder, sources, placed, estimates)
-        shown = found.progress
         written = write_map(
             folder,
-            [_map_source(s, e, found, shown) for s, e in zip(sources, estimates, strict=True)],
+            [
+                s.points(e, threads=threads, progress=found.progress)
+                for s, e in zip(sources, estimates, strict=True)
+            ],
             found.settings,
             duration=float(trajectory.times[-1]),
             placed=on_earth.placed,
@@ -205,28 +204,6 @@ def _one_map(
     report_run(folder, folder.record.found, trajectory)
     names = [source.name for source in sources]
     return MergedMap(folder.path, names, estimates, folder.record.found.verdict)
-
-
-def _map_source(
-    source: Source, estimate: Estimate, found: Ingredients, progress: Progress | None
-) -> MapSource:
-    """Return a run whose points can be read, with or without a bar that shows how far that is."""
-
-    def chunks(counts: dict[str, int]) -> Iterator[MapChunk]:
-        with (
-            source.part() as part,
-            as_progress(progress).stage(f"map {source.name}", part.length) as shown,
-        ):
-            yield from project(
-                part.batches(shown, Counter()),
-                estimate.trajectory,
-                estimate.calibration,
-                segments=estimate.segments,
-                threads=found.settings.threads,
-                counts=counts,
-            )
-
-    return MapSource(estimate, source.start_ns, chunks)
 
 
 def _moved(recorded: Recorded, group: Placed, number: int) -> Recorded:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,19 +12,24 @@ from typing import TYPE_CHECKING, Any
 from pydantic import ValidationError
 
 from bentwing.base.errors import InputError, UsageError
+from bentwing.base.progress import as_progress
 from bentwing.base.provenance import describe_input, files_of
 from bentwing.base.regular_file import resolved
 from bentwing.base.run_record import finished_record, understood
 from bentwing.closing.georeference.settings import GeoreferenceSettings
+from bentwing.map.project import project
 from bentwing.recording import Payload, Recording
 from bentwing.recording.preprocess import RecordingPart
+from bentwing.run.mapping import MapSource
 from bentwing.run.run import estimate_of, require_single, verdict_in
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from bentwing.base.estimate import Estimate
+    from bentwing.base.progress import Progress
     from bentwing.evaluate.verdict import Reason, Verdict
+    from bentwing.map.chunk import MapChunk
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +72,32 @@ class Source:
     def told(self) -> list[str]:
         """Warnings of the run, as a merged map repeats them."""
         return [f"{self.name}: {warning}" for warning in self.warnings]
+
+    def points(
+        self, estimate: Estimate, *, threads: int | None, progress: Progress | None = None
+    ) -> MapSource:
+        """Return the run whose points can be read, with or without a bar that shows how far that is.
+
+        Parameters
+        ----------
+        estimate : of the run, in the frame of the map
+        """
+
+        def chunks(counts: dict[str, int]) -> Iterator[MapChunk]:
+            with (
+                self.part() as part,
+                as_progress(progress).stage(f"map {self.name}", part.length) as shown,
+            ):
+                yield from project(
+                    part.batches(shown, Counter()),
+                    estimate.trajectory,
+                    estimate.calibration,
+                    segments=estimate.segments,
+                    threads=threads,
+                    counts=counts,
+                )
+
+        return MapSource(estimate, self.start_ns, chunks)
 
     @contextmanager
     def part(self) -> Iterator[RecordingPart]:
@@ -163,7 +195,7 @@ def _require_unchanged(
     gone = [path for path in recordings if not path.exists()]
     if gone:
         msg = (
-            f"{folder}: its recording {gone[0]} is gone, and merging reads the points again; "
+            f"{folder}: its recording {gone[0]} is gone, and its points have to be read again; "
             "put it back there, or map it again from where it is now"
         )
         raise InputError(msg)

@@ -1,0 +1,253 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""From a finished run to a file: its points as they are wished, or its trajectory."""
+
+from __future__ import annotations
+
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import gettempdir
+from typing import TYPE_CHECKING
+
+from bentwing.base.arguments import instance, thread_count
+from bentwing.base.errors import UsageError
+from bentwing.base.progress import as_progress
+from bentwing.map.crop import Crop
+from bentwing.map.formats import FORMATS, MAP_FORMATS, require_format
+from bentwing.map.write_tiles import write_tiles
+from bentwing.map.writer import open_map
+from bentwing.recording.preprocess.read_ahead import read_ahead
+from bentwing.run.export.finished import Finished
+from bentwing.run.export.points import Points, Wish
+from bentwing.run.export.trajectory_files import SUFFIXES, Named, format_of, write_trajectory
+
+if TYPE_CHECKING:
+    from collections.abc import Generator
+
+    from bentwing.base.progress import Progress
+    from bentwing.map import MapFormat
+    from bentwing.map.chunk import MapChunk
+    from bentwing.run.export.names import TrajectoryFormat
+    from bentwing.run.run import Run
+
+
+# Made while those before them are compressed and written.
+_CHUNKS_AHEAD = 2
+
+
+@dataclass(frozen=True, slots=True)
+class Exported:
+    """What was written.
+
+    Attributes
+    ----------
+    paths : files, or the folder of the tiles
+    n_points : in them; None for a trajectory
+    origin : of the points, as the user is told
+    counts : what was left out
+    """
+
+    paths: tuple[Path, ...]
+    n_points: int | None = None
+    origin: str = ""
+    counts: dict[str, int] | None = None
+
+    def sentence(self) -> str:
+        """Return what the user is told at the end."""
+        paths = ", ".join(map(str, self.paths))
+        if self.n_points is None:
+            return f"{paths}: the trajectory"
+        left = {
+            "cropped": "outside",
+            "thinned": "thinned out",
+            "moving": "moving",
+            "mixed_pixels": "mixed",
+        }
+        counts = self.counts or {}
+        out = [f"{n:,} {word}" for name, word in left.items() if (n := counts.get(f"map.{name}"))]
+        return f"{paths}: {self.n_points:,} points" + (f" ({', '.join(out)})" if out else "")
+
+
+def export(
+    run: Run | Path | str,
+    path: Path | str,
+    *,
+    spacing: float | None = None,
+    crop: Crop | None = None,
+    polygon: Path | str | None = None,
+    keep_moving: bool | None = None,
+    keep_mixed: bool | None = None,
+    epsg: int | None = None,
+    local: bool = False,
+    tiles: int | None = None,
+    map_format: MapFormat | None = None,
+    trajectory_format: TrajectoryFormat | None = None,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> Exported:
+    """Write a finished run's map, or its trajectory, in another form, without estimating again.
+
+    The points come from the map in the run folder. Where that does not have what is wished, they are read from
+    the recording once more.
+
+    Parameters
+    ----------
+    run : folder of a run, a localized run or a merged map
+    path : of the file, which must not exist; its suffix says the format. With `tiles`, a folder of that
+        name without the suffix
+    spacing : m, edge of the voxels that keep one point each; 0 for all points; default: those of the map
+    crop : what is kept; default: all
+    polygon : GeoJSON or DXF file with areas, inside of which points are kept
+    keep_moving : keep points that beams went through at other times; default: as the map does
+    keep_mixed : keep returns between two surfaces; default: as the map does
+    epsg : projected system of the coordinates; default: that of the map
+    local : write coordinates in the frame of the trajectory
+    tiles : m, edge of square tiles, a file each; default: one file
+    map_format : one of `MAP_FORMATS`; default: what the suffix says
+    trajectory_format : one of `tum`, `kitti`, `euroc`, `kml`, `geojson`; default: what the suffix says
+    threads : default: all cores
+    progress : what to tell the user meanwhile; default: nothing
+
+    Raises
+    ------
+    UsageError
+        If the run is not complete, or the wish cannot be met or leaves nothing.
+    InputError
+        If a file of the run has changed, or the recording is to be read again and is gone or has changed.
+    """
+    out, shown = Path(path), as_progress(progress)
+    thread_count(threads)
+    wish = Wish(spacing, _crop(crop), _path(polygon), keep_moving, keep_mixed, epsg, local)
+    kind = None if map_format is not None else format_of(out, trajectory_format)
+    if trajectory_format is not None and map_format is not None:
+        msg = f"a trajectory ({trajectory_format}) and a map ({map_format}) are two files; export twice"
+        raise UsageError(msg)
+    if kind is not None:
+        if wish != Wish() or tiles is not None:
+            msg = f"{out}: is a trajectory, of which spacing, crop, coordinates and tiles cannot be chosen"
+            raise UsageError(msg)
+        return _export_trajectory(Finished.open(run), out, kind)
+    wanted = require_format(map_format) if map_format is not None else _map_format_of(out)
+    target = out if tiles is None else _without_suffix(out, wanted)
+    _require_new(target)
+    if tiles is not None and (tiles != int(tiles) or tiles < 1):
+        msg = f"tiles of {tiles} m cannot be written; give whole metres"
+        raise UsageError(msg)
+    finished = Finished.open(run)
+    points = Points.of(finished, wish)
+    shown.note(f"export: {points.origin}")
+    counts: dict[str, int] = {}
+    chunks = _some(points.chunks(target.parent, threads=threads, progress=shown, counts=counts))
+    if tiles is not None:
+        n_points = write_tiles(
+            chunks,
+            target,
+            int(tiles),
+            map_format=wanted,
+            clock_origin_ns=finished.origin_ns,
+            system=points.target.system,
+            progress=shown,
+        )
+    else:
+        with (
+            closing(chunks),
+            open_map(target, wanted, finished.origin_ns, points.target.crs_wkt) as writer,
+        ):
+            writer.progress = shown
+            for chunk in chunks:
+                writer.write(chunk)
+        n_points = writer.n_points
+    return Exported((target,), n_points, points.origin, counts)
+
+
+def export_points(
+    run: Run | Path | str,
+    *,
+    spacing: float | None = None,
+    crop: Crop | None = None,
+    polygon: Path | str | None = None,
+    keep_moving: bool | None = None,
+    keep_mixed: bool | None = None,
+    epsg: int | None = None,
+    local: bool = False,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> Generator[MapChunk, None, None]:
+    """Yield the points that `export` writes, as arrays; the parameters are its own.
+
+    Raises
+    ------
+    UsageError, InputError
+        At once, as `export`; an empty result is no error.
+    """
+    thread_count(threads)
+    wish = Wish(spacing, _crop(crop), _path(polygon), keep_moving, keep_mixed, epsg, local)
+    points = Points.of(Finished.open(run), wish)
+    return points.chunks(Path(gettempdir()), threads=threads, progress=progress)
+
+
+def _export_trajectory(run: Finished, out: Path, kind: TrajectoryFormat) -> Exported:
+    named = [Named(name, poses, run.start_ns[name]) for name, poses in run.trajectories.items()]
+    paths = [out]
+    if len(named) > 1:
+        paths = [out.with_name(f"{out.stem}_{one.name}{out.suffix}") for one in named]
+    for path in paths:
+        _require_new(path)
+    for path, one in zip(paths, named, strict=True):
+        write_trajectory(path, kind, one, run.coordinates)
+    return Exported(tuple(paths))
+
+
+def _crop(crop: Crop | None) -> Crop:
+    return Crop() if crop is None else instance("crop", crop, Crop, "give bentwing.map.Crop(...)")
+
+
+def _path(path: Path | str | None) -> Path | None:
+    return None if path is None else Path(path)
+
+
+def _map_format_of(path: Path) -> MapFormat:
+    """Return the map format that a name ends in; the longest, as that of COPC ends in that of LAZ."""
+    name = path.name.lower()
+    for known in sorted(MAP_FORMATS, key=len, reverse=True):
+        if name.endswith(f".{known}"):
+            return require_format(known)
+    listed = ", ".join(f".{name}" for name in FORMATS)
+    msg = (
+        f"{path}: its name says no format; end it in {listed} for a map, or in {', '.join(SUFFIXES)} "
+        "for a trajectory"
+    )
+    raise UsageError(msg)
+
+
+def _without_suffix(path: Path, map_format: str) -> Path:
+    name = path.name
+    if name.lower().endswith(f".{map_format}"):
+        name = name[: -len(map_format) - 1]
+    return path.with_name(name)
+
+
+def _require_new(path: Path) -> None:
+    if path.exists():
+        msg = f"{path}: exists already; name another, or move this one away"
+        raise UsageError(msg)
+    if not path.parent.is_dir():
+        msg = f"{path}: there is no folder {path.parent}; make it, or name a place elsewhere"
+        raise UsageError(msg)
+
+
+def _some(chunks: Generator[MapChunk, None, None]) -> Generator[MapChunk, None, None]:
+    """Pass chunks on; refuse an export without any.
+
+    Raises
+    ------
+    UsageError
+    """
+    is_empty = True
+    with closing(read_ahead(chunks, _CHUNKS_AHEAD)) as ahead:
+        for chunk in ahead:
+            is_empty = False
+            yield chunk
+    if is_empty:
+        msg = "no point of the map is left; crop less, and see the report for where the map is"
+        raise UsageError(msg)

@@ -1,0 +1,252 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""The points of a finished run, from its map where that has them, else from its recording."""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bentwing.base.errors import BentwingError, UsageError
+from bentwing.base.progress import as_progress
+from bentwing.map.clean import clean
+from bentwing.map.crop import Crop, Cropper
+from bentwing.map.thin import thin
+from bentwing.run.export.area import area_in
+from bentwing.run.export.coordinates import same
+from bentwing.run.mapping import clock_of, in_turn, joined_trajectory, with_own_times
+from bentwing.run.settings import SMALLEST_SPACING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Generator, Iterator
+    from pathlib import Path
+
+    from bentwing.base.progress import Progress
+    from bentwing.map.chunk import MapChunk
+    from bentwing.map.clean import CleanSettings
+    from bentwing.map.read_chunks import MapFile
+    from bentwing.run.export.coordinates import Change, Target
+    from bentwing.run.export.finished import Finished
+    from bentwing.run.merging.source import Source
+
+
+@dataclass(frozen=True, slots=True)
+class Wish:
+    """What an export has.
+
+    Attributes
+    ----------
+    spacing : m, edge of the voxels that keep one point each; 0 for all points; None for those of the map
+    crop : what is kept, in the coordinates of the export
+    keep_moving, keep_mixed : whether such points are kept; None for what the map does
+    polygon : file of areas, inside of which points are kept beside what the crop says
+    epsg : projected system; None for the coordinates of the map
+    local : whether coordinates are in the frame of the trajectory
+    """
+
+    spacing: float | None = None
+    crop: Crop = field(default_factory=Crop)
+    polygon: Path | None = None
+    keep_moving: bool | None = None
+    keep_mixed: bool | None = None
+    epsg: int | None = None
+    local: bool = False
+
+    def __post_init__(self) -> None:
+        spacing = self.spacing
+        if spacing is not None and spacing != 0 and not spacing >= SMALLEST_SPACING:
+            msg = (
+                f"a spacing of {spacing} m cannot be used; give 0 for all points, or "
+                f"{SMALLEST_SPACING:g} m and more"
+            )
+            raise UsageError(msg)
+        if self.polygon is not None and self.crop.area is not None:
+            msg = f"{self.polygon}: an area is given already; give the crop's area or a file"
+            raise UsageError(msg)
+
+    def cleaning(self, of_map: CleanSettings) -> CleanSettings:
+        """Return what is left out, where the map leaves out `of_map`."""
+        kept = {"moving": self.keep_moving, "mixed_pixels": self.keep_mixed}
+        changed = {name: not keep for name, keep in kept.items() if keep is not None}
+        return of_map.model_copy(update=changed)
+
+
+@dataclass(frozen=True, slots=True)
+class Points:
+    """Where the points of an export come from.
+
+    Attributes
+    ----------
+    origin : of them, as the user is told
+    target : coordinates of the export
+    """
+
+    origin: str
+    target: Target
+    _wish: Wish
+    _run: Finished
+    _source: MapFile | list[Source]
+
+    @classmethod
+    def of(cls, run: Finished, wish: Wish) -> Points:
+        """Decide where the points come from, and refuse what cannot be done before any work.
+
+        Raises
+        ------
+        UsageError
+            If the wish cannot be met, or leaves nothing.
+        InputError
+            If the recording has to be read again, and is gone or has changed.
+        """
+        target = run.coordinates.target(epsg=wish.epsg, local=wish.local)
+        if wish.polygon is not None:
+            area = area_in(target, wish.polygon)
+            wish = replace(wish, crop=replace(wish.crop, area=area), polygon=None)
+        stored = run.map_file()
+        reason = _why_again(run, wish, stored)
+        if reason is None and stored is not None:
+            _require_some(run, wish, target, stored)
+            origin = f"from {stored.path.name}, {stored.n_points:,} points"
+            return cls(origin, target, wish, run, stored)
+        _require_some(run, wish, target, None)
+        try:
+            sources = run.sources()
+        except BentwingError as error:
+            msg = f"{run.folder}: {reason}, so the recording has to be read again: {error}"
+            raise type(error)(msg) from error
+        return cls(f"from the recording, as {reason}", target, wish, run, sources)
+
+    def chunks(
+        self,
+        folder: Path,
+        *,
+        threads: int | None = None,
+        progress: Progress | None = None,
+        counts: dict[str, int] | None = None,
+    ) -> Generator[MapChunk, None, None]:
+        """Yield the points as they are wished.
+
+        Parameters
+        ----------
+        folder : of temporary files, where the recording is read again
+        counts : receives what was left out
+        """
+        counts = {} if counts is None else counts
+        wish = self._wish
+        # Distances are those of the ground, which a projection stretches.
+        near, rest = Crop(within=wish.crop.within), replace(wish.crop, within=None)
+        with self._read(folder, threads, as_progress(progress), counts) as (read, change, to_path):
+            if near:
+                read = Cropper(near, self._run.path, to_path).chunks(read, counts)
+            moved = (replace(chunk, points=change(chunk.points)) for chunk in read)
+            if rest:
+                moved = Cropper(rest).chunks(moved, counts)
+            yield from thin(moved, self._spacing(), counts)
+
+    def _spacing(self) -> float:
+        """Return the edge of the voxels to thin with; a map is not thinned twice with the same ones.
+
+        Its coordinates are rounded, and two points next to a border would share a voxel then.
+        """
+        own = self._run.spacing
+        wanted = own if self._wish.spacing is None else self._wish.spacing
+        return 0.0 if wanted == own and not isinstance(self._source, list) else wanted
+
+    @contextmanager
+    def _read(
+        self, folder: Path, threads: int | None, progress: Progress, counts: dict[str, int]
+    ) -> Iterator[tuple[Generator[MapChunk, None, None], Change, Change]]:
+        """Open the source: its points, the way to the export's coordinates and to the path's frame."""
+        if isinstance(self._source, list):
+            chunks = _again(self._run, self._wish, self._source, folder, threads, progress, counts)
+            yield chunks, self.target.from_local, same
+            return
+        stored = self._source
+        with progress.stage("export", stored.n_points, "points") as shown:
+            read = _shown(stored.chunks(self._run.origin_ns), shown.advance)
+            yield read, self.target.from_map, self._run.coordinates.nearly_local
+
+
+def _why_again(run: Finished, wish: Wish, stored: MapFile | None) -> str | None:
+    """Return why the map does not have what is wished; None if it has."""
+    if run.map_name is None:
+        return "the run was made without a map"
+    if stored is None:
+        return f"{run.map_name} is not there, or does not keep all that is known of its points"
+    if wish.spacing is not None and wish.spacing < run.spacing:
+        return f"its map has one point in {run.spacing:g} m only"
+    if wish.cleaning(run.cleaning) != run.cleaning:
+        return "its map was cleaned otherwise"
+    return None
+
+
+def _require_some(run: Finished, wish: Wish, target: Target, stored: MapFile | None) -> None:
+    """Refuse a crop that leaves nothing, as far as that can be seen from outside.
+
+    Raises
+    ------
+    UsageError
+    """
+    times, span = wish.crop.times, run.span
+    if times is not None and (times[1] < span[0] or times[0] > span[1]):
+        msg = (
+            f"no point was measured from {times[0]:g} to {times[1]:g} s: the run has {span[0]:.1f} to "
+            f"{span[1]:.1f} s"
+        )
+        raise UsageError(msg)
+    if stored is None or not stored.n_points:
+        return
+    corners = np.stack([stored.low, stored.high])
+    grid = np.stack(np.meshgrid(*corners.T, indexing="ij"), axis=-1).reshape(-1, 3)
+    box = target.from_map(grid)
+    low, high = wish.crop.bounds
+    if (low > box.max(axis=0) + 1.0).any() or (high < box.min(axis=0) - 1.0).any():
+        msg = (
+            f"nothing of the map is inside: it reaches from {_written(box.min(axis=0))} to "
+            f"{_written(box.max(axis=0))} m"
+        )
+        raise UsageError(msg)
+
+
+def _written(corner: np.ndarray) -> str:
+    return "(" + ", ".join(f"{value:.1f}" for value in corner) + ")"
+
+
+def _again(  # noqa: PLR0917 - private, called once
+    run: Finished,
+    wish: Wish,
+    sources: list[Source],
+    folder: Path,
+    threads: int | None,
+    progress: Progress,
+    counts: dict[str, int],
+) -> Generator[MapChunk, None, None]:
+    """Read the recordings with the trajectories of the map, and clean their points."""
+    points = [s.points(s.estimate, threads=threads, progress=progress) for s in sources]
+    _, late = clock_of(points)
+    for chunk in clean(
+        in_turn(points, counts),
+        folder,
+        duration=_duration(sources),
+        settings=wish.cleaning(run.cleaning),
+        counts=counts,
+        threads=threads,
+    ):
+        yield with_own_times(chunk, late)
+
+
+def _duration(sources: list[Source]) -> float:
+    if len(sources) > 1:
+        return float(joined_trajectory([source.estimate for source in sources]).times[-1])
+    with sources[0].part() as part:
+        return part.length
+
+
+def _shown(
+    chunks: Iterator[MapChunk], advance: Callable[[float], None]
+) -> Generator[MapChunk, None, None]:
+    for chunk in chunks:
+        yield chunk
+        advance(len(chunk))

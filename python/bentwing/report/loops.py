@@ -40,7 +40,6 @@ def consistency_table(walls: Thickness | None, revisits: Revisits | None) -> str
         rows.append(
             ("offset between two visits, standard deviation", f"{1e3 * revisits.std:.1f} mm", rest)
         )
-    rows.append(("against control points or a reference", DASH, "see bentwing evaluate"))
     return table(("measure", "median", "spread"), rows, numbers=frozenset({1}))
 
 
@@ -56,7 +55,7 @@ def closing_table(record: Mapping[str, Any] | None, *, asked: bool) -> str:
             ("pairs of stretches that saw the same", f"{record['n_stretch_pairs']:,}"),
             ("of these seen again later", f"{record['n_revisits']:,}"),
             ("matches that agree at the end", f"{100 * record['inlier_share']:.1f} %"),
-            ("residual, \N{GREEK SMALL LETTER SIGMA}", f"{record['residual_rms']:.2f}"),
+            ("their distance, as a multiple of the expected noise of one point", f"{record['residual_rms']:.2f}"),
             ("largest correction", f"{1e3 * record['largest_translation']:.1f} mm, "
              f"{np.degrees(record['largest_rotation']):.3f}°"),
         ]  # fmt: skip

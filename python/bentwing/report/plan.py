@@ -10,7 +10,16 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from bentwing.report.colours import HEIGHT
 from bentwing.report.picture import encode_png
-from bentwing.report.svg import FAINT, INK, legend, nice_ticks, open_svg, scale_bar, text
+from bentwing.report.svg import (
+    FAINT,
+    INK,
+    least_width,
+    legend,
+    nice_ticks,
+    open_svg,
+    scale_bar,
+    text,
+)
 from bentwing.report.way import draw_way
 
 if TYPE_CHECKING:
@@ -61,9 +70,10 @@ def draw_plan(
     """
     height, width, _ = view.image.shape
     data = base64.b64encode(encode_png(view.image)).decode("ascii")
+    wide = max(width, least_width(_SIZE))
     foot = height + 32.0 + _SIZE
     parts = [
-        open_svg(width + _LEFT, height + _TOP + _FOOT, name),
+        open_svg(wide + _LEFT, height + _TOP + _FOOT, name),
         f'<g transform="translate({_LEFT} {_TOP})">',
         f'<image width="{width}" height="{height}" href="data:image/png;base64,{data}"/>',
         f'<rect width="{width}" height="{height}" fill="none" stroke="{FAINT}"/>',
@@ -71,7 +81,7 @@ def draw_plan(
         draw_way(view, way),
         *_marked(marks, view),
         *scale_bar(view, foot, _SIZE),
-        *legend(view, "height, m", HEIGHT, (float(width), foot - 10.0), _SIZE),
+        *legend(view, "height, m", HEIGHT, (float(wide), foot - 10.0), _SIZE),
     ]
     if frame.is_north_up:
         parts.append(_north(width - 40.0, 14.0))

@@ -44,17 +44,23 @@ def map_view(
     ends : what stands at the ends of the legend; default: the values there
     """
     height, width, _ = view.image.shape
+    wide = max(width, least_width(text_size))
     full = height + 24 + 2 * text_size
     data = base64.b64encode(encode_png(view.image)).decode("ascii")
     parts = [
-        open_svg(width, full, name),
+        open_svg(wide, full, name),
         f'<image width="{width}" height="{height}" href="data:image/png;base64,{data}"/>',
     ]
     if way is not None:
         parts.append(draw_way(view, way))
     parts += scale_bar(view, height + 24.0, text_size)
-    parts += legend(view, value_label, table, (float(width), height + 14.0), text_size, ends)
+    parts += legend(view, value_label, table, (float(wide), height + 14.0), text_size, ends)
     return "".join([*parts, "</svg>"])
+
+
+def least_width(text_size: int) -> int:
+    """Return the pixels that scale bar and legend need beside each other."""
+    return 32 * text_size
 
 
 def nice_ticks(low: float, high: float, n: int) -> list[float]:
@@ -94,13 +100,14 @@ def legend(  # noqa: PLR0917 - what, where and how large
     right, y = corner
     identity = f"g{table[0]}"
     stops = "".join(gradient(table))
+    bar = 14 * text_size + 10
     low, high = ends or (f"{round(v, 1) + 0.0:.1f}" for v in (view.low, view.high))
     return [
         f'<defs><linearGradient id="{identity}">{stops}</linearGradient></defs>',
-        f'<rect x="{right - 260}" y="{y}" width="256" height="10" rx="2" fill="url(#{identity})"/>',
-        text(right - 260, y + 16 + text_size, low, "start", INK, text_size),
+        f'<rect x="{right - bar - 4}" y="{y}" width="{bar}" height="10" rx="2" fill="url(#{identity})"/>',
+        text(right - bar - 4, y + 16 + text_size, low, "start", INK, text_size),
         text(right - 4, y + 16 + text_size, high, "end", INK, text_size),
-        text(right - 132, y + 16 + text_size, label, "middle", FAINT, text_size),
+        text(right - bar - 14, y + 11, label, "end", FAINT, text_size),
     ]
 
 

@@ -15,10 +15,10 @@ from bentwing.map.epsg import epsg_of_map
 from bentwing.map.gps_time import adjusted_gps_origin
 from bentwing.map.read import read_parts
 from bentwing.report.colours import TIME
+from bentwing.report.finished import map_of, trajectory_of
 from bentwing.report.geotiff import write_geotiff
 from bentwing.report.lettering import with_scale
 from bentwing.report.picture import View, paint, project, write_png
-from bentwing.report.view.contents import map_of, trajectory_of
 from bentwing.report.view.levels import FINEST, Level
 from bentwing.report.views import SLAB, overhead_points
 

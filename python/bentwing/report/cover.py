@@ -57,7 +57,7 @@ def _plan(record: Mapping[str, Any], views: MapViews, texts: Texts) -> str:
     said = [
         texts.plan_note,
         texts.plan_north if views.is_north_up else texts.plan_local,
-        texts.plan_roof if views.is_roofed else "",
+        texts.plan_roof if views.ceiling is not None else "",
         texts.plan_marks if marks else "",
         spans_sentence(degenerate_spans(record.get("windows") or [])),
     ]

@@ -28,7 +28,14 @@ def map_section(drawn: Drawn) -> str:
         why = texts.no_points if is_wanted else texts.no_map
         return f'<h2>{escape(texts.map)}</h2><p class="none">{escape(why)}</p>'
     figures = [
-        scene(drawn.points, drawn.times, drawn.trajectory, record.get("windows") or []),
+        scene(
+            drawn.points,
+            drawn.times,
+            drawn.trajectory,
+            record.get("windows") or [],
+            ceiling=views.ceiling,
+            origin=drawn.origin,
+        ),
         figure(views.oblique, texts.oblique, texts.oblique_note, wide=True),
         figure(views.plan_time, texts.by_time, texts.by_time_note, wide=True),
         figure(views.side, texts.side, texts.side_note, wide=True),

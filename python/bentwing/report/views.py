@@ -27,20 +27,25 @@ if TYPE_CHECKING:
 _WAY = ("1f2933", "c8412e")  # seen in all directions, and not
 SLAB = 1.0  # m, thickness of the section
 _HEADROOM = 0.3  # m above the sensor from which on a point counts as overhead
+_CEILING_BIN, _CEILING_ROOM = 0.05, 0.15  # m, and m of it that goes with the ceiling
 _NEAR = 2.0  # m beside the sensor within which overhead points tell a roof
 _ROOFED_SHARE = 0.5  # of the seconds; in the open almost nothing is ever right above the sensor
 
 
 @dataclass(frozen=True, slots=True)
 class MapViews:
-    """SVG drawings of one map; whether what is above the sensor is left out, and whether north is up."""
+    """SVG drawings of one map.
+
+    `ceiling` is the height, m, above which a view from above shows the roof only, None in the open;
+    `is_north_up` says whether the plan's y axis is grid north.
+    """
 
     plan: str
     oblique: str
     plan_time: str
     side: str
     section: str
-    is_roofed: bool
+    ceiling: float | None
     is_north_up: bool
 
 
@@ -83,7 +88,7 @@ def draw_views(
         plan_time=map_view(by_time, "time, s", TIME, name="Plan by time"),
         side=_upright(points, along, beside, "Side view"),
         section=_upright(points[slab], along, beside, "Section"),
-        is_roofed=bool(overhead.any()),
+        ceiling=ceiling_of(points[overhead, 2]),
         is_north_up=shown.is_north_up,
     )
 
@@ -103,6 +108,15 @@ def overhead_points(
     seconds = np.floor(when[np.hypot(*beside) < _NEAR])
     roofed = len(np.unique(seconds)) > _ROOFED_SHARE * len(np.unique(np.floor(times)))
     return above if roofed else np.zeros(len(points), np.bool_)
+
+
+def ceiling_of(heights: NDArray[np.float64]) -> float | None:
+    """Return a height just below most of the points (N,) m that are overhead; None without any."""
+    if not len(heights):
+        return None
+    bins = np.floor(heights / _CEILING_BIN).astype(np.int64)
+    levels, counts = np.unique(bins, return_counts=True)
+    return float(levels[counts.argmax()] * _CEILING_BIN - _CEILING_ROOM)
 
 
 def _followed(trajectory: Trajectory, times: NDArray[np.float64], axis: int) -> NDArray[np.float64]:

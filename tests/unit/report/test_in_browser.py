@@ -56,7 +56,7 @@ FAULTS = """() => {
     .filter(e => e.scrollWidth > e.clientWidth + 1 && e.clientWidth && getComputedStyle(e).overflowX === 'visible')
     .map(e => e.tagName + '.' + e.className + ' ' + e.textContent.slice(0, 30));
   const on = [];
-  for (const parent of document.querySelectorAll('main, main *:not(svg):not(svg *)')) {
+  for (const parent of document.querySelectorAll('main, main *:not(svg):not(svg *):not(.stage)')) {
     const boxes = [...parent.children].filter(e => !['SPAN', 'B', 'BUTTON', 'STRONG'].includes(e.tagName))
       .map(e => [e, e.getBoundingClientRect()]).filter(([, r]) => r.width && r.height);
     boxes.forEach(([a, r], i) => boxes.slice(i + 1).forEach(([b, q]) => {
@@ -141,11 +141,17 @@ def test_the_view_turns_zooms_and_changes_colour(opened, report):
         page.mouse.move(box["x"] + 420, box["y"] + 230)
         page.mouse.up()
 
+    cut = page.locator("#scene input[data-side=high][data-axis='2']")
     acts = (
         turn,
         lambda: page.mouse.wheel(0, -300),
         page.locator("#scene button[value=time]").click,
         page.locator("#scene button[value=top]").click,
+        page.locator("#scene button[value=side]").click,
+        lambda: cut.fill("1.5"),
+        lambda: canvas.press("ArrowLeft"),
+        lambda: canvas.press("+"),
+        lambda: canvas.press("Shift+ArrowUp"),
     )
     seen = [first, *(drawn(page, act) for act in acts)]
     page.screenshot(path=report.with_name("report.png"), full_page=True)
@@ -160,3 +166,34 @@ def test_nothing_overflows_and_nothing_lies_on_anything_else(opened):
         opened.set_viewport_size({"width": width, "height": 900})
         found = opened.evaluate(FAULTS)
         assert found == {"page": 0, "wide": [], "on": [], "texts": []}, width
+
+
+def test_the_page_scrolls_past_the_view_until_that_is_clicked(opened):
+    box = opened.locator("#scene canvas").bounding_box()
+    opened.mouse.move(box["x"] + 200, box["y"] + 200)
+    before = opened.evaluate("scrollY")
+    opened.mouse.wheel(0, -120)
+    opened.wait_for_function(f"scrollY < {before}")
+    opened.locator("#scene canvas").click()
+    here = opened.evaluate("scrollY")
+    drawn(opened, lambda: opened.mouse.wheel(0, -120))
+    assert opened.evaluate("scrollY") == here
+
+
+def test_the_map_fits_and_distances_are_those_of_the_scale_bar(opened):
+    canvas = opened.locator("#scene canvas")
+    drawn(opened, opened.locator("#scene button[value=top]").click)
+    drawn(opened, opened.locator("#scene button[value=measure]").click)
+    box, bar = (
+        opened.locator(f"#scene {part}").bounding_box() for part in ("canvas", "[data-part=bar]")
+    )
+    metres = float(opened.locator("#scene [data-part=length]").inner_text().split()[0])
+    scale = bar["width"] / metres
+    # The room of 20 by 10 m is turned by 37° to grid north: it fills the view, and nothing is cut off.
+    assert 0.8 < max(22 * scale / box["width"], 20 * scale / box["height"]) < 1.0
+    middle = box["width"] / 2, box["height"] / 2
+    drawn(opened, lambda: canvas.click(position={"x": middle[0] - 3 * scale, "y": middle[1]}))
+    drawn(opened, lambda: canvas.click(position={"x": middle[0] + 3 * scale, "y": middle[1]}))
+    told = opened.locator("#scene [data-part=distance]").inner_text()
+    assert float(told.split()[0]) == pytest.approx(6.0, abs=14 / scale)
+    assert opened.locator("#scene [data-part=measured] circle").count() == 2

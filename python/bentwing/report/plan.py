@@ -9,6 +9,7 @@ from html import escape
 from typing import TYPE_CHECKING, TypeAlias
 
 from bentwing.report.colours import HEIGHT
+from bentwing.report.lettering import coordinate, multiples
 from bentwing.report.picture import encode_png
 from bentwing.report.svg import (
     FAINT,
@@ -96,30 +97,21 @@ def _grid(view: View, origin: NDArray[np.float64]) -> list[str]:
     ticks = nice_ticks(0.0, max(right - left, top - bottom), _LINES)
     step = ticks[1] - ticks[0] if len(ticks) > 1 else 1.0
     parts = []
-    for x in _multiples(left, right, step):
+    for x in multiples(left, right, step):
         at = (x - left) / pixel
         parts.append(_line(f"M{at:.1f} 0V{height}"))
         if 30 < at < width - 30:
-            parts.append(text(at, height + 5 + _SIZE, _label(x), "middle", INK, _SIZE))
-    for y in _multiples(bottom, top, step):
+            parts.append(text(at, height + 5 + _SIZE, coordinate(x), "middle", INK, _SIZE))
+    for y in multiples(bottom, top, step):
         at = (top - y) / pixel
         parts.append(_line(f"M0 {at:.1f}H{width}"))
         if 30 < at < height - 30:
             turned = f'transform="rotate(-90 -10 {at:.1f})"'
             parts.append(
                 f'<text x="-10" y="{at:.1f}" {turned} text-anchor="middle" fill="{INK}" '
-                f'font-size="{_SIZE}">{_label(y)}</text>'
+                f'font-size="{_SIZE}">{coordinate(y)}</text>'
             )
     return parts
-
-
-def _multiples(low: float, high: float, step: float) -> list[float]:
-    first = int(-(-low // step))
-    return [i * step for i in range(first, int(high // step) + 1)]
-
-
-def _label(value: float) -> str:
-    return f"{value:,.0f}" if abs(value) >= 10 else f"{value + 0.0:g}"
 
 
 def _line(path: str) -> str:

@@ -6,7 +6,7 @@ from __future__ import annotations
 from html import escape
 from typing import TYPE_CHECKING, Any
 
-from bentwing.evaluate.map import wall_thickness
+from bentwing.evaluate.thickness import wall_thickness
 from bentwing.report.loops import consistency_table, revisits_table
 from bentwing.report.scene import scene
 from bentwing.report.sections import figure
@@ -57,12 +57,14 @@ def coverage_section(drawn: Drawn) -> str:
     return f'<h2>{escape(texts.coverage)}</h2><div class="grid">{figures}</div>'
 
 
-def agreement_section(points: NDArray[Any], revisits: Revisits | None, texts: Texts) -> str:
+def agreement_section(
+    points: NDArray[Any], times: NDArray[Any], revisits: Revisits | None, texts: Texts
+) -> str:
     """Show how well the map agrees with itself: what is known without any reference."""
     if not len(points):
         return ""
     try:
-        walls = wall_thickness(points)
+        walls = wall_thickness(points, times)
     except ValueError:
         walls = None
     loops = revisits_table(revisits, None if walls is None else walls.median)

@@ -57,7 +57,7 @@ def write_report(
         cover(drawn),
         evidence.map_section(drawn),
         evidence.coverage_section(drawn),
-        evidence.agreement_section(map_sample[0], revisits, texts),
+        evidence.agreement_section(*map_sample, revisits, texts),
         on_earth_section(run_json.get("georeference")),
         merging_section(run_json.get("merging")),
     ]

@@ -63,7 +63,7 @@ NO_POINTS = (np.empty((0, 3)), np.empty(0))
 
 
 class Page(HTMLParser):
-    void = ("meta", "br", "img")
+    void = ("meta", "br", "img", "input")
 
     def __init__(self):
         super().__init__()

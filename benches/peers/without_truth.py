@@ -19,7 +19,7 @@ from bentwing.base import geometry
 from bentwing.base.errors import BentwingError
 from bentwing.base.trajectory import Trajectory, read_tum
 from bentwing.base.transform import apply
-from bentwing.evaluate.map import wall_thickness
+from bentwing.evaluate.thickness import wall_thickness
 from bentwing.recording import LidarBatch, Payload, Recording
 from bentwing.recording.preprocess import preprocess
 
@@ -36,7 +36,7 @@ COLUMNS = (
 )  # fmt: skip
 NOTES = """\
 - End: the last pose in the frame of the first, of the lidar or, where there is one, of the IMU.
-- Thickness: standard deviation of points across planes fitted to patches of 1 m. bentwing's map is
+- Thickness: standard deviation of points across planes fitted to small patches. bentwing's map is
   the one that it writes; of the others every point is placed by the poses around it, which are
   stamped as their engines mean it, and by constant velocities between (the gyro's attitude, where
   there is one).

@@ -10,7 +10,7 @@ import pytest
 
 from bentwing.base import geometry
 from bentwing.base.trajectory import read_tum
-from bentwing.evaluate.map import wall_thickness
+from bentwing.evaluate.thickness import wall_thickness
 from bentwing.map.read import read_points
 from bentwing.run.pipeline import map_recording
 

@@ -23,6 +23,7 @@ COMMANDS = {
     "calibrate": "Calibrate a sensor head: motor, IMU and clocks.",
     "plan": "Plan a flight: spin rate, point spacing, coverage.",
     "evaluate": "Measure the errors of a trajectory and a map.",
+    "report": "Draw the report of a run again, and print it.",
     "view": "Show a run: map, path and windows over time.",
     "simulate": "Simulate a recording with truth.",
     "reproduce": "Make a paper's figures and tables again.",

@@ -34,6 +34,7 @@ def command(
     map_spacing: options.Spacing = None,
     keep_moving: options.KeepMoving = False,
     keep_mixed: options.KeepMixed = False,
+    project: options.Project = None,
     threads: options.Threads = None,
     start: options.Start = None,
     duration: options.Duration = None,
@@ -50,6 +51,7 @@ def command(
     # slow to import, so only when it is needed
     from bentwing.base.progress import create_progress
     from bentwing.cli.done import say_run
+    from bentwing.recording.sections.project import Project
     from bentwing.run.choose import choose, given
     from bentwing.run.pipeline import run_recording
 
@@ -59,6 +61,7 @@ def command(
         map_spacing=map_spacing,
         cleaning=options.cleaning(keep_mixed=keep_mixed, keep_moving=keep_moving),
         prior_map=prior_map,
+        project=None if project is None else Project.load(project),
         threads=threads,
         start=start,
         duration=duration,

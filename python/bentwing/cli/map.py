@@ -44,6 +44,7 @@ def command(
             options.MAP, "--no-map", help="Leave the map out: the trajectory alone, much sooner."
         ),
     ] = False,
+    project: options.Project = None,
     write_payload: options.WritePayload = None,
     threads: options.Threads = None,
     start: options.Start = None,
@@ -71,6 +72,7 @@ def command(
     from bentwing.base.progress import create_progress
     from bentwing.cli.done import say_maps, say_run
     from bentwing.recording.flights import flights_of
+    from bentwing.recording.sections.project import Project
     from bentwing.run.choose import choose, given
     from bentwing.run.pipeline import run_recording
 
@@ -82,6 +84,7 @@ def command(
         georeferencing=given(mode=georeference, epsg=epsg, control_points=control_points),
         loop_closure=False if no_loop_closure else None,
         writes_map=False if no_map else None,
+        project=None if project is None else Project.load(project),
         threads=threads,
         start=start,
         duration=duration,

@@ -33,6 +33,7 @@ def command(
     georeference: options.Georeference = None,
     epsg: options.Epsg = None,
     control_points: options.ControlPoints = None,
+    project: options.Project = None,
     threads: options.Threads = None,
     quiet: options.Quiet = False,
 ) -> None:
@@ -57,6 +58,7 @@ def command(
             **given(mode=georeference, epsg=epsg, control_points=control_points)
         ),
         cleaning=CleanSettings(**options.cleaning(keep_mixed=keep_mixed, keep_moving=keep_moving)),
+        project=project,
         threads=threads,
         progress=create_progress(quiet=quiet),
     )

@@ -170,6 +170,14 @@ ControlPoints = Annotated[
     ),
 ]
 
+Project = Annotated[
+    Path | None,
+    option(
+        RESULT,
+        metavar="FILE",
+        help="YAML with name, site, client, operator and more of the project, for the report.",
+    ),
+]
 WritePayload = Annotated[
     Path | None,
     option(

@@ -22,9 +22,9 @@ from bentwing.evaluate.against_track import TrackError, compare_with_track
 from bentwing.evaluate.clouds import Cloud
 from bentwing.evaluate.drift_boxes import DriftBoxes, drift_boxes
 from bentwing.evaluate.entropy import MapEntropy, map_entropy
-from bentwing.evaluate.map import Thickness, wall_thickness
 from bentwing.evaluate.revisits import Revisits, revisit_consistency
 from bentwing.evaluate.spacing import PointSpacing, point_spacing
+from bentwing.evaluate.thickness import Thickness, wall_thickness
 from bentwing.evaluate.track import read_track
 from bentwing.evaluate.tracked_point import moved_to_point
 
@@ -193,7 +193,7 @@ def _map_alone(cloud: Cloud, result: Evaluation) -> None:
     points, times = cloud.sample.points, cloud.sample.times
     result.spacing = point_spacing(cloud)
     try:
-        result.thickness = wall_thickness(points)
+        result.thickness = wall_thickness(points, times if cloud.has_times else None)
     except ValueError as error:
         result.notes.append(f"no wall thickness: {error}")
     result.entropy = map_entropy(points)

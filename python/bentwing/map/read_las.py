@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
+    from numpy.typing import NDArray
+
     from bentwing.map.read_rows import Table
 
 
@@ -32,3 +34,12 @@ def las_points(path: Path) -> Iterator[Table]:
         if n != file.header.point_count:
             msg = f"{path}: announces {file.header.point_count} points, holds {n}; it is truncated"
             raise InputError(msg)
+
+
+def las_run_ids(path: Path) -> Iterator[NDArray[np.uint16]]:
+    """Read which run the points are from, in the parts of `las_points`; none where that is unknown."""
+    require_sound_las(path)
+    with laspy.open(path) as file:
+        if "run_id" in file.header.point_format.dimension_names:
+            for part in file.chunk_iterator(PART):
+                yield np.array(part.run_id, np.uint16)

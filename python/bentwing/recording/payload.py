@@ -25,6 +25,7 @@ from bentwing.recording.sections.encoder import Encoder
 from bentwing.recording.sections.gnss import Gnss
 from bentwing.recording.sections.imu import Imu
 from bentwing.recording.sections.lidar import Lidar
+from bentwing.recording.sections.project import Project
 from bentwing.recording.sections.section import Section, Transform
 from bentwing.recording.sections.self_hits import SelfHit
 
@@ -44,6 +45,7 @@ class Payload(Section):
     encoder : the motor that turns the lidar, if there is one
     gnss : the receiver, if its fixes are to be used
     calibration : what `bentwing calibrate` has found out about the values above
+    project : what the report says of the job
     """
 
     name: str = "payload"
@@ -54,6 +56,7 @@ class Payload(Section):
     encoder: Encoder | None = None
     gnss: Gnss | None = None
     calibration: CalibrationRecord | None = None
+    project: Project | None = None
 
     @classmethod
     def default(cls) -> Payload:

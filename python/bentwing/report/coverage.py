@@ -20,6 +20,7 @@ _FINEST = 0.1  # m, edge of a cell
 _WIDTH = 640  # pixels of the picture, about
 _APART = 10.0  # s without any point in a cell, which divide two visits
 _MOST_VISITS = 8.0  # at the end of the colour map at least this many
+_FLOATING = 0.02  # of a cell's points at either end are no surface
 _FEWEST = 3  # sampled points in a cell that count as seen
 
 
@@ -32,6 +33,7 @@ class Coverage:
     density, visits : SVG
     cell : m, edge of the squares that are counted
     area : m², of the squares that were seen
+    volume : m³, of these squares from the lowest to the highest surface
     median_density : points per m² of plan, of the squares that were seen
     share_again : of the area that was seen in more than one visit
     """
@@ -40,6 +42,7 @@ class Coverage:
     visits: str
     cell: float
     area: float
+    volume: float
     median_density: float
     share_again: float
 
@@ -73,21 +76,38 @@ def draw_coverage(
     return Coverage(
         map_view(
             _picture(shown, seen, span, HEIGHT, frame),
-            "log₁₀ of points per m²",
+            "points per m²",
             HEIGHT,
             name="Point density from above",
+            ends=(f"{10 ** span[0]:,.0f}", f"{10 ** span[1]:,.0f}"),
         ),
         map_view(
             _picture(visits, seen, (1.0, most), TIME, frame),
             "visits",
             TIME,
             name="Visits from above",
+            ends=("1", f"{most:.0f}"),
         ),
         cell,
         float(np.count_nonzero(seen) * cell**2),
+        float(_heights(keys, points[inside, 2], seen.ravel()).sum() * cell**2),
         float(np.median(density[seen])),
         float((visits[seen] > 1).mean()),
     )
+
+
+def _heights(
+    keys: NDArray[np.int64], z: NDArray[np.float64], seen: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    """Return the height (K,) m between the lowest and the highest surface of each cell that was seen."""
+    order = np.lexsort((z, keys))
+    keys, z = keys[order], z[order]
+    cells = np.flatnonzero(seen)
+    first, last = np.searchsorted(keys, cells), np.searchsorted(keys, cells, side="right")
+    # a point or two that float are no surface
+    slack = ((last - first) * _FLOATING).astype(np.int64)
+    heights: NDArray[np.float64] = z[last - 1 - slack] - z[first + slack]
+    return heights
 
 
 def _visits(keys: NDArray[np.int64], times: NDArray[np.float64], n: int) -> NDArray[np.float64]:

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from bentwing.evaluate.map import Thickness
     from bentwing.evaluate.revisits import Revisits
+    from bentwing.evaluate.thickness import Thickness
 
 _SPAN = 20.0  # s, of the flight that are one side of a loop
 _SHOWN = 12  # loops in the table, those with most patches
@@ -27,21 +27,24 @@ def consistency_table(walls: Thickness | None, revisits: Revisits | None) -> str
     """Make the table of how well the map agrees with itself."""
     rows: list[Row] = []
     if walls is not None:
-        half = f"middle half {1e3 * walls.p25:.1f} to {1e3 * walls.p75:.1f} mm, {len(walls.stds):,} patches"
-        rows.append(
-            (
-                "thickness of flat surfaces, one standard deviation",
-                f"{1e3 * walls.median:.1f} mm",
-                half,
-            )
-        )
+        for name, which in (("first", ~walls.is_later), ("later", walls.is_later)):
+            if np.count_nonzero(which) >= _FEWEST:
+                rows.append(_thickness(f"thickness of flat surfaces, {name} visits", walls, which))
     if revisits is not None:
         rest = f"95 % below {1e3 * revisits.p95:.1f} mm, {revisits.n_patches:,} patches"
         rows.append(
             ("offset between two visits, standard deviation", f"{1e3 * revisits.std:.1f} mm", rest)
         )
-    rows.append(("against control points or a reference", DASH, "see bentwing evaluate"))
     return table(("measure", "median", "spread"), rows, numbers=frozenset({1}))
+
+
+def _thickness(name: str, walls: Thickness, which: NDArray[np.bool_]) -> Row:
+    p25, median, p75 = (1e3 * np.percentile(walls.stds[which], [25, 50, 75])).tolist()
+    spread = (
+        f"middle half {p25:.1f} to {p75:.1f} mm, {np.count_nonzero(which):,} patches "
+        f"of {walls.edge:g} m"
+    )
+    return f"{name}, one standard deviation", f"{median:.1f} mm", spread
 
 
 def closing_table(record: Mapping[str, Any] | None, *, asked: bool) -> str:
@@ -56,7 +59,7 @@ def closing_table(record: Mapping[str, Any] | None, *, asked: bool) -> str:
             ("pairs of stretches that saw the same", f"{record['n_stretch_pairs']:,}"),
             ("of these seen again later", f"{record['n_revisits']:,}"),
             ("matches that agree at the end", f"{100 * record['inlier_share']:.1f} %"),
-            ("residual, \N{GREEK SMALL LETTER SIGMA}", f"{record['residual_rms']:.2f}"),
+            ("their distance, as a multiple of the expected noise of one point", f"{record['residual_rms']:.2f}"),
             ("largest correction", f"{1e3 * record['largest_translation']:.1f} mm, "
              f"{np.degrees(record['largest_rotation']):.3f}°"),
         ]  # fmt: skip

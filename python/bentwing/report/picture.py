@@ -107,7 +107,7 @@ def project(
     close_gaps : pixels by which gaps are filled from their edges; it thickens lines as well
     frame : left, right, bottom and top of the picture, m; default: what holds all but far outliers
     """
-    left, right, bottom, top = frame or _frame(across, up)
+    left, right, bottom, top = frame or frame_of(across, up)
     pixel = max((right - left) / width, (top - bottom) / max_height, _FINEST)
     shape = (max(int((top - bottom) / pixel), 1) + 1, max(int((right - left) / pixel), 1) + 1)
     front = _front_points(((top - up) / pixel, (across - left) / pixel), toward, shape)
@@ -201,7 +201,7 @@ def _png_chunk(kind: bytes, data: bytes) -> bytes:
     return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
 
 
-def _frame(
+def frame_of(
     across: NDArray[np.float64], up: NDArray[np.float64]
 ) -> tuple[float, float, float, float]:
     """Left, right, bottom and top that hold all but far outliers, with a margin of 2 %."""

@@ -28,7 +28,7 @@ const startScene = (figure) => {
   };
 
   const points = program(
-    `uniform mat4 camera; uniform vec3 origin; uniform float step, size; uniform vec2 heights;
+    `uniform mat4 camera; uniform vec3 origin, low, high; uniform float step, size; uniform vec2 heights;
      uniform bool byTime, isPath; uniform vec3 table[9];
      in vec3 place; in float value; out vec3 colour;
      vec3 shade(float x) {
@@ -37,8 +37,9 @@ const startScene = (figure) => {
      }
      void main() {
        vec3 p = origin + place * step;
-       gl_Position = camera * vec4(p, 1.0);
-       gl_PointSize = clamp(size / gl_Position.w, 1.5, 9.0);
+       bool isCut = !isPath && (any(lessThan(p, low)) || any(greaterThan(p, high)));
+       gl_Position = isCut ? vec4(9.0, 9.0, 9.0, 1.0) : camera * vec4(p, 1.0);
+       gl_PointSize = clamp(size, 1.5, 9.0);
        float x = byTime ? value : (p.z - heights.x) / max(heights.y - heights.x, 1e-6);
        colour = isPath ? mix(vec3(0.12, 0.16, 0.2), vec3(0.78, 0.25, 0.18), value) : shade(x);
      }`,
@@ -51,19 +52,16 @@ const startScene = (figure) => {
   const light = program(
     `out vec2 at;
      void main() { at = vec2(gl_VertexID & 1, gl_VertexID >> 1) * 2.0; gl_Position = vec4(at * 2.0 - 1.0, 0.0, 1.0); }`,
-    `uniform sampler2D colours, depths; uniform vec2 pixelSize, range; in vec2 at; out vec4 pixel;
-     float far(vec2 p) {
-       float d = texture(depths, p).r * 2.0 - 1.0;
-       return log2(2.0 * range.x * range.y / (range.y + range.x - d * (range.y - range.x)));
-     }
+    `uniform sampler2D colours, depths; uniform vec2 pixelSize; uniform float depthInPixels; in vec2 at; out vec4 pixel;
      void main() {
-       if (texture(depths, at).r >= 1.0) { pixel = vec4(1.0); return; }
-       float here = far(at), hidden = 0.0;
+       float here = texture(depths, at).r, hidden = 0.0;
+       if (here >= 1.0) { pixel = vec4(1.0); return; }
        for (int k = 0; k < 8; k++) {
          float a = 0.7854 * float(k);
-         hidden += max(0.0, here - far(at + 1.5 * pixelSize * vec2(cos(a), sin(a))));
+         float there = texture(depths, at + 1.5 * pixelSize * vec2(cos(a), sin(a))).r;
+         hidden += clamp((here - there) * depthInPixels / 1.5, 0.0, 4.0);
        }
-       pixel = vec4(texture(colours, at).rgb * (0.3 + 0.7 * exp(-6.0 * hidden)), 1.0);
+       pixel = vec4(texture(colours, at).rgb * (0.3 + 0.7 * exp(-hidden / 10.0)), 1.0);
      }`);
 
   const buffer = (places, values) => {
@@ -97,23 +95,35 @@ const startScene = (figure) => {
   const colours = texture(gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE, gl.COLOR_ATTACHMENT0);
   const depths = texture(gl.DEPTH_COMPONENT24, gl.DEPTH_COMPONENT, gl.UNSIGNED_INT, gl.DEPTH_ATTACHMENT);
 
+  const places = new Uint16Array(bytes(data.points).buffer);
+  const size = data.high.map((x, i) => x - data.low[i]);
   const oblique = { turn: -0.5, lift: 0.6 };
-  const view = { ...oblique, far: 1.5 * data.radius, at: [...data.centre], byTime: false };
+  const view = { ...oblique, at: [...data.centre], scale: 1, byTime: false, low: [...data.low], high: [...data.high] };
+  view.high[2] = data.cut;
 
-  // From map to clip coordinates; matrices are column-major.
+  // All views are orthographic, so that the scale bar is true everywhere.
   const axes = () => {
     const [ct, st, cl, sl] = [Math.cos(view.turn), Math.sin(view.turn), Math.cos(view.lift), Math.sin(view.lift)];
     return { right: [ct, st, 0], up: [-st * sl, ct * sl, cl], toward: [st * cl, -ct * cl, sl] };
   };
-  const camera = (range) => {
+  const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+  const fit = () => { // scale in CSS pixels per metre at which the whole map is seen
+    const { right, up } = axes();
+    const reach = (axis) => axis.reduce((sum, x, i) => sum + Math.abs(x) * size[i], 0);
+    view.scale = 0.92 * Math.min(canvas.clientWidth / reach(right), canvas.clientHeight / reach(up));
+    view.at = [...data.centre];
+  };
+  const depth = () => 2 * data.radius + Math.hypot(...view.at.map((x, i) => x - data.centre[i]));
+  const camera = () => { // from map to clip coordinates; column-major
     const { right, up, toward } = axes();
-    const dot = (a) => a[0] * view.at[0] + a[1] * view.at[1] + a[2] * view.at[2];
-    const f = 1.9, aspect = canvas.width / canvas.height, [near, far] = range;
-    const a = (far + near) / (near - far), b = (2 * far * near) / (near - far);
-    const row = (r, scale, shift) => [...r.map((x) => x * scale), -dot(r) * scale + shift];
-    const x = row(right, f / aspect, 0), y = row(up, f, 0);
-    const z = row(toward, a, -a * view.far + b), w = row(toward, -1, view.far);
-    return [0, 1, 2, 3].flatMap((i) => [x[i], y[i], z[i], w[i]]);
+    const row = (axis, factor) => [...axis.map((x) => x * factor), -dot(axis, view.at) * factor];
+    const rows = [row(right, 2 * view.scale / canvas.clientWidth), row(up, 2 * view.scale / canvas.clientHeight),
+      row(toward, -1 / depth()), [0, 0, 0, 1]];
+    return [0, 1, 2, 3].flatMap((i) => rows.map((r) => r[i]));
+  };
+  const onScreen = (p) => { // CSS pixels from the upper left, and metres towards the viewer
+    const { right, up, toward } = axes(), q = p.map((x, i) => x - view.at[i]);
+    return [canvas.clientWidth / 2 + view.scale * dot(right, q), canvas.clientHeight / 2 - view.scale * dot(up, q), dot(toward, q)];
   };
 
   const uniform = (which, name) => gl.getUniformLocation(which, name);
@@ -121,22 +131,25 @@ const startScene = (figure) => {
   const draw = () => {
     const ratio = window.devicePixelRatio || 1;
     const [w, h] = [Math.round(canvas.clientWidth * ratio), Math.round(canvas.clientHeight * ratio)];
+    if (!w || !h) return;
     if (canvas.width !== w || canvas.height !== h || !draw.count) {
       [canvas.width, canvas.height] = [w, h];
       colours.fit(w, h);
       depths.fit(w, h);
+      if (!view.isMoved) fit();
     }
-    const range = [Math.max(0.02 * view.far, 0.05), view.far + 3 * data.radius];
     gl.viewport(0, 0, w, h);
     gl.bindFramebuffer(gl.FRAMEBUFFER, target);
     gl.clearColor(1, 1, 1, 1);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     gl.enable(gl.DEPTH_TEST);
     gl.useProgram(points);
-    gl.uniformMatrix4fv(uniform(points, "camera"), false, camera(range));
+    gl.uniformMatrix4fv(uniform(points, "camera"), false, camera());
     gl.uniform3fv(uniform(points, "origin"), data.origin);
+    gl.uniform3fv(uniform(points, "low"), view.low);
+    gl.uniform3fv(uniform(points, "high"), view.high);
     gl.uniform1f(uniform(points, "step"), data.step);
-    gl.uniform1f(uniform(points, "size"), data.spacing * h * 1.9);
+    gl.uniform1f(uniform(points, "size"), data.spacing * view.scale * ratio);
     gl.uniform2fv(uniform(points, "heights"), data.heights);
     gl.uniform1i(uniform(points, "byTime"), view.byTime);
     gl.uniform3fv(uniform(points, "table"), table(view.byTime ? data.time_colours : data.height_colours));
@@ -156,41 +169,143 @@ const startScene = (figure) => {
     gl.uniform1i(uniform(light, "colours"), 0);
     gl.uniform1i(uniform(light, "depths"), 1);
     gl.uniform2f(uniform(light, "pixelSize"), 1 / w, 1 / h);
-    gl.uniform2fv(uniform(light, "range"), range);
+    gl.uniform1f(uniform(light, "depthInPixels"), 2 * depth() * view.scale * ratio);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
     gl.activeTexture(gl.TEXTURE0);
+    drawScale();
+    drawMeasure();
     draw.count = (draw.count || 0) + 1;
     figure.dataset.drawn = draw.count;
   };
   let asked = 0;
   const redraw = () => { asked = asked || requestAnimationFrame(() => { asked = 0; draw(); }); };
 
-  canvas.addEventListener("pointerdown", (e) => canvas.setPointerCapture(e.pointerId));
+  const part = (name) => figure.querySelector(`[data-part="${name}"]`);
+  const drawScale = () => {
+    const longest = canvas.clientWidth / 4 / view.scale, magnitude = 10 ** Math.floor(Math.log10(longest));
+    const metres = [5, 2, 1].map((m) => m * magnitude).find((m) => m <= longest);
+    part("bar").style.width = `${metres * view.scale}px`;
+    part("length").textContent = metres >= 1 ? `${metres} m` : `${Math.round(1000 * metres)} mm`;
+    const codes = view.byTime ? data.time_colours : data.height_colours;
+    part("colours").style.background = `linear-gradient(to right, ${codes.map((c) => "#" + c).join(",")})`;
+    const [low, high] = view.byTime ? data.seconds : data.heights, unit = view.byTime ? "s" : "m";
+    part("lowest").textContent = `${low.toFixed(1)} ${unit}`;
+    part("highest").textContent = `${high.toFixed(1)} ${unit}`;
+  };
+
+  // A distance between two points of the map that are picked.
+  const picked = [];
+  const isShown = (p) => p.every((x, i) => x >= view.low[i] && x <= view.high[i]);
+  const pick = (x, y) => { // the nearest to the viewer of those within some pixels, else none
+    const near = 6;
+    let best = null, nearest = -Infinity;
+    for (let k = 0; k < places.length; k += 3) {
+      const p = [0, 1, 2].map((i) => data.origin[i] + data.step * places[k + i]);
+      const [a, b, toward] = onScreen(p);
+      if (toward > nearest && Math.hypot(a - x, b - y) < near && isShown(p)) [best, nearest] = [p, toward];
+    }
+    return best;
+  };
+  const drawMeasure = () => {
+    const overlay = part("measured"), at = picked.map(onScreen);
+    overlay.innerHTML = at.map(([x, y]) => `<circle cx="${x}" cy="${y}" r="5"/>`).join("")
+      + (at.length === 2 ? `<line x1="${at[0][0]}" y1="${at[0][1]}" x2="${at[1][0]}" y2="${at[1][1]}"/>` : "");
+    const told = part("distance");
+    if (!view.isMeasuring) told.textContent = "";
+    else if (picked.length < 2) told.textContent = data.words[picked.length ? "second" : "first"];
+    else {
+      const gap = picked[1].map((x, i) => x - picked[0][i]);
+      const [level, whole] = [Math.hypot(gap[0], gap[1]), Math.hypot(...gap)].map((x) => x.toFixed(3));
+      told.textContent = data.words.distance.replace("{whole}", whole).replace("{level}", level).replace("{up}", gap[2].toFixed(3));
+    }
+  };
+
+  const turnBy = (x, y) => {
+    view.turn -= 0.008 * x;
+    view.lift = Math.min(Math.max(view.lift + 0.008 * y, -Math.PI / 2), Math.PI / 2);
+  };
+  const shiftBy = (x, y) => {
+    const { right, up } = axes();
+    view.at = view.at.map((c, i) => c + (up[i] * y - right[i] * x) / view.scale);
+    view.isMoved = true;
+  };
+  const zoomBy = (factor) => {
+    view.scale = Math.min(Math.max(view.scale * factor, 20 / data.radius), 5000);
+    view.isMoved = true;
+  };
+
+  // The page scrolls past the view until that is clicked, and again once something else is.
+  const setActive = (isActive) => {
+    figure.classList.toggle("active", isActive);
+    canvas.style.touchAction = isActive ? "none" : "pan-y";
+  };
+  document.addEventListener("pointerdown", (e) => { if (!figure.contains(e.target)) setActive(false); });
+  const fingers = new Map();
+  let moved = 0;
+  canvas.addEventListener("pointerdown", (e) => {
+    canvas.setPointerCapture(e.pointerId);
+    fingers.set(e.pointerId, [e.clientX, e.clientY]);
+    moved = 0;
+  });
   canvas.addEventListener("contextmenu", (e) => e.preventDefault());
   canvas.addEventListener("pointermove", (e) => {
-    if (!e.buttons) return;
-    if (e.buttons === 1 && !e.shiftKey) {
-      view.turn -= 0.008 * e.movementX;
-      view.lift = Math.min(Math.max(view.lift + 0.008 * e.movementY, -1.57), 1.57);
-    } else {
-      const { right, up } = axes(), metres = view.far / (0.95 * canvas.clientHeight);
-      view.at = view.at.map((x, i) => x + metres * (up[i] * e.movementY - right[i] * e.movementX));
-    }
+    const before = fingers.get(e.pointerId);
+    if (!before) return;
+    const [x, y] = [e.clientX - before[0], e.clientY - before[1]];
+    moved += Math.hypot(x, y);
+    const other = [...fingers].find(([id]) => id !== e.pointerId);
+    if (other) { // two fingers shift and zoom
+      const far = (p) => Math.max(Math.hypot(p[0] - other[1][0], p[1] - other[1][1]), 1);
+      zoomBy(far([e.clientX, e.clientY]) / far(before));
+      shiftBy(x / 2, y / 2);
+    } else if (e.buttons === 1 && !e.shiftKey) turnBy(x, y);
+    else shiftBy(x, y);
+    fingers.set(e.pointerId, [e.clientX, e.clientY]);
+    redraw();
+  });
+  for (const kind of ["pointerup", "pointercancel"]) canvas.addEventListener(kind, (e) => fingers.delete(e.pointerId));
+  canvas.addEventListener("click", (e) => {
+    setActive(true);
+    if (!view.isMeasuring || moved > 4) return;
+    const box = canvas.getBoundingClientRect(), found = pick(e.clientX - box.left, e.clientY - box.top);
+    if (!found) return;
+    if (picked.length === 2) picked.length = 0;
+    picked.push(found);
     redraw();
   });
   canvas.addEventListener("wheel", (e) => {
+    if (!figure.classList.contains("active") && !e.ctrlKey) return;
     e.preventDefault();
-    view.far = Math.min(Math.max(view.far * Math.exp(0.0012 * e.deltaY), 0.5), 8 * data.radius);
+    zoomBy(Math.exp(-0.0012 * e.deltaY));
     redraw();
   }, { passive: false });
-  const choices = {
-    height: { byTime: false }, time: { byTime: true },
-    oblique: { ...oblique, far: 1.5 * data.radius, at: [...data.centre] },
-    top: { turn: 0, lift: 1.57, far: 1.5 * data.radius, at: [...data.centre] },
-    side: { turn: 0, lift: 0, far: 1.5 * data.radius, at: [...data.centre] },
+  const steps = { ArrowLeft: [-24, 0], ArrowRight: [24, 0], ArrowUp: [0, -24], ArrowDown: [0, 24] };
+  canvas.addEventListener("keydown", (e) => {
+    if (steps[e.key]) (e.shiftKey ? shiftBy : turnBy)(...steps[e.key]);
+    else if (e.key === "+" || e.key === "=") zoomBy(1.2);
+    else if (e.key === "-") zoomBy(1 / 1.2);
+    else if (e.key === "Escape") { picked.length = 0; setActive(false); }
+    else return;
+    e.preventDefault();
+    redraw();
+  });
+
+  const looks = { oblique, top: { turn: 0, lift: Math.PI / 2 }, front: { turn: 0, lift: 0 }, side: { turn: Math.PI / 2, lift: 0 } };
+  const press = (button) => {
+    const { value } = button;
+    if (looks[value]) { Object.assign(view, looks[value], { isMoved: false }); fit(); }
+    else if (value === "measure") { view.isMeasuring = !view.isMeasuring; picked.length = 0; button.ariaPressed = view.isMeasuring; }
+    else view.byTime = value === "time";
+    redraw();
   };
-  for (const button of figure.querySelectorAll("button")) {
-    button.addEventListener("click", () => { Object.assign(view, structuredClone(choices[button.value])); redraw(); });
+  for (const button of figure.querySelectorAll("button")) button.addEventListener("click", () => press(button));
+  for (const slider of figure.querySelectorAll("input[type=range]")) { // one side of the clip box
+    const side = slider.dataset.side, axis = Number(slider.dataset.axis), told = slider.nextElementSibling;
+    const tell = () => { told.textContent = `${(view[side][axis] + data.shown[axis]).toFixed(2)} m`; };
+    [slider.min, slider.max, slider.step] = [data.low[axis], data.high[axis], "any"];
+    slider.value = view[side][axis];
+    slider.addEventListener("input", () => { view[side][axis] = Number(slider.value); tell(); redraw(); });
+    tell();
   }
   new ResizeObserver(redraw).observe(canvas);
   redraw();

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""The map in three dimensions inside the report: turned with the mouse, without any network."""
+"""The map in three dimensions inside the report: turned, cut and measured, without any network."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import numpy as np
 
 from bentwing.report.colours import HEIGHT, TIME
 from bentwing.report.stretches import degenerate
+from bentwing.report.view.levels import FINEST, Level
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -20,13 +21,22 @@ if TYPE_CHECKING:
 
     from bentwing.base.trajectory import Trajectory
 
-N_POINTS = 300_000
+N_POINTS = 400_000
 """Points in the page, seven bytes each."""
 N_PATH = 20_000
 _STEPS = 65535
+_OVERLAP = 1.4  # voxels that a dot is wide
 _BUTTONS = {
     "Colour": {"height": "Height", "time": "Time"},
-    "View": {"oblique": "Oblique", "top": "Top", "side": "Side"},
+    "View": {"oblique": "Oblique", "top": "Top", "front": "Front", "side": "Side"},
+    "Distance": {"measure": "Measure"},
+}
+_SIDES = (("x from", "low", 0), ("x to", "high", 0), ("y from", "low", 1), ("y to", "high", 1),
+          ("height from", "low", 2))  # fmt: skip
+_WORDS = {
+    "first": "Click a point of the map.",
+    "second": "Click another point.",
+    "distance": "{whole} m apart; {level} m level, {up} m up.",
 }
 
 
@@ -35,36 +45,67 @@ def scene(
     times: NDArray[np.float64],
     trajectory: Trajectory,
     windows: Sequence[Mapping[str, Any]] = (),
+    *,
+    ceiling: float | None = None,
+    origin: NDArray[np.float64] | None = None,
 ) -> str:
     """Return the view as HTML with its data and its script.
 
     Parameters
     ----------
-    points : (N, 3) m, map frame, at least one; every k-th is shown if they are many
+    points : (N, 3) m, shown coordinates, at least one; thinned evenly in space if they are many
     times : (N,) s since the recording's start
     trajectory : of the IMU; may be empty
     windows : records of the estimate; where one is degenerate the path is red
+    ceiling : m, at which the view is cut at first; default: nowhere
+    origin : (3,) m, to add to coordinates for those that are written; default: 0
     """
-    chosen = slice(None, None, len(points) // N_POINTS + 1)
-    data = json.dumps(_data(points[chosen], times[chosen], trajectory, windows))
+    level = Level(FINEST, N_POINTS)
+    level.add(points, times)
+    even = level.result  # one point per voxel: beams are dense where the sensor was
+    data = _data(even.points.astype(np.float64), even.times, trajectory, windows)
+    data["spacing"] = _OVERLAP * max(even.edge, data["spacing"] / _OVERLAP / 2)
+    if ceiling is not None:
+        data["cut"] = min(max(ceiling, data["low"][2]), data["high"][2])
+    data["shown"] = [0.0, 0.0, 0.0] if origin is None else origin.tolist()
     script = files("bentwing.report").joinpath("scene.js").read_text(encoding="utf-8")
     return (
-        '<figure id="scene" class="wide"><canvas></canvas>'
-        f'<div class="choices">{_buttons()}</div>'
-        f'<script type="application/json">{data}</script>'
-        "<figcaption><b>In three dimensions</b> Drag to turn, wheel to zoom, right or shift drag to "
-        "shift. The path of the sensor is dark, and red where a direction was not seen. "
-        '<span class="without">This browser shows no WebGL; the pictures below say the same.</span>'
-        f"</figcaption></figure><script>{script}</script>"
+        f'<figure id="scene" class="wide"><div class="stage">{_STAGE}</div>{_choices()}'
+        f'<script type="application/json">{json.dumps(data)}</script>'
+        "<figcaption><b>In three dimensions</b> Without perspective, so that the scale bar is true everywhere. Drag to "
+        "turn, right or shift drag to shift, two fingers to shift and zoom. The wheel zooms after a click, or with Ctrl. "
+        "Keys: arrows turn, shift and arrows shift, + and \N{MINUS SIGN} zoom. The way of the sensor is dark, and red where a "
+        'direction was not seen. <span class="without">This browser shows no WebGL; the pictures below say the '
+        f"same.</span></figcaption></figure><script>{script}</script>"
     )
 
 
-def _buttons() -> str:
+_STAGE = (
+    '<canvas tabindex="0" role="img" aria-label="The map in three dimensions; arrow keys turn it"></canvas>'
+    '<svg data-part="measured"></svg>'
+    '<div class="scale"><div data-part="bar"></div><span data-part="length"></span></div>'
+    '<div class="legend"><div data-part="colours"></div><span data-part="lowest"></span>'
+    '<span data-part="highest"></span></div>'
+)
+
+
+def _choices() -> str:
     groups = []
     for name, choices in _BUTTONS.items():
-        buttons = [f'<button value="{v}">{label}</button>' for v, label in choices.items()]
+        buttons = [
+            f'<button type="button" value="{v}">{label}</button>' for v, label in choices.items()
+        ]
         groups.append(f"<span>{name} {''.join(buttons)}</span>")
-    return "".join(groups)
+    cut = _slider("Cut at height", "high", 2)
+    box = "".join(_slider(*side) for side in _SIDES)
+    return (
+        f'<div class="choices">{"".join(groups)}{cut}<output data-part="distance"></output></div>'
+        f'<details class="box"><summary>Clip box</summary><div class="choices">{box}</div></details>'
+    )
+
+
+def _slider(name: str, side: str, axis: int) -> str:
+    return f'<label>{name} <input type="range" data-side="{side}" data-axis="{axis}"><output></output></label>'
 
 
 def _data(
@@ -89,10 +130,15 @@ def _data(
         "origin": origin.tolist(),
         "step": step,
         "centre": ((low + high) / 2).tolist(),
+        "low": low.tolist(),
+        "high": high.tolist(),
+        "cut": float(high[2]),
+        "words": _WORDS,
         "radius": max(radius, 0.5),
         # about what separates points that lie evenly on the surfaces of a box of this size
         "spacing": 2.0 * max(radius, 0.5) / max(len(points), 1) ** 0.5,
         "heights": np.percentile(points[:, 2], [1, 99]).tolist() if len(points) else [0.0, 1.0],
+        "seconds": [float(first), float(last)],
         "height_colours": HEIGHT,
         "time_colours": TIME,
         "points": _text(np.rint((points - origin) / step).astype("<u2")),

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from html import escape
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
@@ -10,43 +11,48 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bentwing.base.trajectory import Trajectory
+from bentwing.evaluate.expected import ExpectedAccuracy
 from bentwing.report.picture import thinned
+from bentwing.report.texts import ENGLISH
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
+    from bentwing.report.coverage import Coverage
+    from bentwing.report.texts import Texts
+
 Row = tuple[str, ...]
 _PAUSE = 1.0  # s without a pose: there one run ends and the next begins
 
-DASH, TIMES = "\N{EN DASH}", "\N{MULTIPLICATION SIGN}"
+# A sign each, for those who do not see the colours apart.
+_SIGNS = {"good": "\N{CHECK MARK}", "warn": "!", "bad": "\N{MULTIPLICATION X}"}
+DASH, TIMES, MINUS = "\N{EN DASH}", "\N{MULTIPLICATION SIGN}", "\N{MINUS SIGN}"
+_BEFORE_UNIT = re.compile(r"(?<=\d) (?=(?:mm|m|%|s)\b)")
 
 
-def verdict(record: Mapping[str, Any]) -> str:
-    """State in one box whether the result can be used as it is."""
+def verdict(record: Mapping[str, Any], texts: Texts = ENGLISH) -> str:
+    """State in one box whether the result can be used as it is, and how accurate it is."""
     found = record.get("verdict") or {}
     reasons = [f"{r['sentence']}: {r['advice']}" for r in found.get("reasons") or []]
     warnings = [str(warning) for warning in record.get("warnings") or []]
     if not record.get("complete", False):
         stage, reason = record.get("stage", "?"), record.get("reason") or "not finished"
-        level, headline = "bad", "Incomplete: this is not a finished map"
-        sentence = (
-            f"The run stopped in the stage “{stage}”: {reason}. What was done until then is kept."
-        )
+        level, headline = "bad", texts.incomplete
+        sentence = texts.stopped.format(stage=stage, reason=reason)
     else:
         state = found.get("state", "good")
         level = {"good": "good", "doubtful": "warn", "failed": "bad"}[state]
-        headline = found.get("headline") or "Map finished"
-        sentence = "" if reasons else _quality(record.get("windows") or [])
-    items = "".join(f"<li>{escape(_capital(reason))}.</li>" for reason in reasons)
+        headline = found.get("headline") or texts.finished
+        sentence = expected(record, texts)
+    items = "".join(f"<li>{escape(capital(reason))}.</li>" for reason in reasons)
     listed = _set_up(record.get("set_up") or []) + (f"<ul>{items}</ul>" if items else "")
     if warnings:
         items = "".join(f"<li>{escape(warning)}</li>" for warning in warnings)
-        listed += f"<p>Worth knowing:</p><ul>{items}</ul>"
-    listed += "".join(f"<p>Note: {escape(str(note))}.</p>" for note in record.get("notes") or [])
+        listed += f"<p>{texts.worth_knowing}</p><ul>{items}</ul>"
     said = f"<p>{escape(sentence)}</p>" if sentence else ""
-    return f'<div class="verdict {level}"><strong>{escape(headline)}</strong>{said}{listed}</div>'
+    return f'<div class="verdict {level}"><strong>{_SIGNS[level]} {escape(headline)}</strong>{said}{listed}</div>'
 
 
 def _set_up(findings: Sequence[Mapping[str, Any]]) -> str:
@@ -54,7 +60,7 @@ def _set_up(findings: Sequence[Mapping[str, Any]]) -> str:
     if not findings:
         return ""
     items = "".join(
-        f"<li>{escape(_capital(f['sentence']))}: <code>{escape(f['line'])}</code></li>"
+        f"<li>{escape(capital(f['sentence']))}: <code>{escape(f['line'])}</code></li>"
         for f in findings
     )
     return (
@@ -63,11 +69,20 @@ def _set_up(findings: Sequence[Mapping[str, Any]]) -> str:
     )
 
 
-def _capital(sentence: str) -> str:
+def capital(sentence: str) -> str:
+    """Begin a sentence with a capital letter."""
     return sentence[:1].upper() + sentence[1:]
 
 
-def _quality(windows: Sequence[Mapping[str, Any]]) -> str:
+def expected(record: Mapping[str, Any], texts: Texts) -> str:
+    """Say how accurate the result is expected to be."""
+    found = record.get("expected_accuracy")
+    said = ExpectedAccuracy(**found).sentence() if found else texts.accuracy_none
+    return _BEFORE_UNIT.sub("\N{NO-BREAK SPACE}", said)
+
+
+def quality(windows: Sequence[Mapping[str, Any]]) -> str:
+    """Say how many matches agree with the trajectory."""
     shares = [w["inlier_share"] for w in windows if w.get("inlier_share") is not None]
     if not shares:
         return "All stages completed."
@@ -77,25 +92,35 @@ def _quality(windows: Sequence[Mapping[str, Any]]) -> str:
     )
 
 
-def tiles(record: Mapping[str, Any], trajectory: Trajectory, points: NDArray[np.float64]) -> str:
+def tiles(
+    record: Mapping[str, Any],
+    trajectory: Trajectory,
+    points: NDArray[np.float64],
+    coverage: Coverage | None,
+    texts: Texts = ENGLISH,
+) -> str:
     """Show the few numbers everybody asks for."""
-    counts, timings = record.get("counts") or {}, record.get("timings") or {}
+    counts = record.get("counts") or {}
     facts: list[tuple[str, str]] = []
+    if coverage is not None:
+        facts.append((f"{coverage.area:,.0f} m²", texts.area))
+        facts.append((f"{coverage.volume:,.0f} m³", texts.volume))
     if len(trajectory.times) > 1:
         parts = _parts(trajectory)
         duration = sum(float(part.times[-1] - part.times[0]) for part in parts)
-        facts.append((_clock(duration), "recording"))
-        facts.append((f"{sum(map(path_length, parts)):,.0f} m", "path flown or walked"))
-        if timings.get("total"):
-            facts.append((f"{duration / timings['total']:.1f} {TIMES}", "real time"))
+        facts.append((f"{sum(map(path_length, parts)):,.0f} m", texts.length))
+        facts.append((clock(duration), texts.duration))
     if "map.points" in counts:
         n_points = counts.get("map.written", counts["map.points"])
-        facts.append((_amount(n_points), "points in the map"))
+        facts.append((_amount(n_points), texts.points))
     if len(points):
         size = np.subtract(*np.percentile(thinned(points), [99.8, 0.2], axis=0))
-        facts.append((f" {TIMES} ".join(f"{s:.0f}" for s in size) + " m", "extent"))
-    if record.get("peak_memory_mb"):
-        facts.append((f"{record['peak_memory_mb'] / 1000:.1f} GB", "peak memory"))
+        facts.append(
+            (
+                f"\N{THIN SPACE}{TIMES}\N{THIN SPACE}".join(f"{s:.0f}" for s in size) + " m",
+                texts.extent,
+            )
+        )
     cells = [
         f'<div class="tile"><b>{escape(b)}</b><span>{escape(s)}</span></div>' for b, s in facts
     ]
@@ -130,53 +155,32 @@ def table(head: Row, rows: Iterable[Row], *, numbers: frozenset[int] = frozenset
     if not body:
         return '<p class="none">Not recorded.</p>'
     top = "".join(f"<th>{escape(text)}</th>" for text in head)
-    return f"<table><thead><tr>{top}</tr></thead><tbody>{''.join(body)}</tbody></table>"
-
-
-def mapping_table(head: Row, values: Mapping[str, Any]) -> str:
-    """Make a table of names and values, nested names joined by dots."""
-    return table(
-        head, [(k.replace("_", " "), _value(v)) for k, v in _flat(values)], numbers=frozenset({1})
+    return (
+        f'<div class="scroll"><table><thead><tr>{top}</tr></thead>'
+        f"<tbody>{''.join(body)}</tbody></table></div>"
     )
 
 
-def timings_table(timings: Mapping[str, float]) -> str:
-    """Make the table of wall times by stage."""
+def mapping_table(head: Row, values: Mapping[str, Any], *, are_amounts: bool = True) -> str:
+    """Make a table of names and values, nested names joined by dots.
+
+    Parameters
+    ----------
+    are_amounts : whether thousands are set apart; a code, a year or a version is no amount
+    """
+    rows = [(k.replace("_", " "), _value(v, are_amounts=are_amounts)) for k, v in _flat(values)]
+    return table(head, rows, numbers=frozenset({1}) if are_amounts else frozenset())
+
+
+def timings_table(timings: Mapping[str, float], peak_memory_mb: float | None) -> str:
+    """Make the table of wall times by stage, and of the most memory."""
     rows = [
         ((f"{DASH} " + name.split("/", 1)[1]) if "/" in name else name, f"{seconds:.2f}")
         for name, seconds in timings.items()
     ]
+    if peak_memory_mb is not None:
+        rows.append(("most memory, MB", f"{peak_memory_mb:.1f}"))
     return table(("stage", "seconds"), rows, numbers=frozenset({1}))
-
-
-def residuals_table(rows: Sequence[Mapping[str, Any]]) -> str:
-    """Make the table of control points: distance of the surface around each, along its normal."""
-
-    def millimetres(value: float | None) -> str:
-        return DASH if value is None else f"{1000 * value:+.1f}"
-
-    cells = [
-        (
-            str(row["id"]),
-            str(row["use"]),
-            f"{row['points']:,}",
-            DASH if row["normal"] is None else ", ".join(f"{n:+.2f}" for n in row["normal"]),
-            millimetres(row["before"]),
-            millimetres(row["residual"]),
-            millimetres(row.get("picked_off")),
-        )
-        for row in rows
-    ]
-    head = (
-        "mark",
-        "use",
-        "points",
-        "normal (east, north, up)",
-        "before, mm",
-        "residual, mm",
-        "seen in the map, off by, mm",
-    )
-    return table(head, cells, numbers=frozenset({2, 4, 5, 6}))
 
 
 def shares_table(shares: Sequence[Mapping[str, Any]]) -> str:
@@ -211,17 +215,24 @@ def _flat(values: Mapping[str, Any], prefix: str = "") -> list[tuple[str, Any]]:
     return flat
 
 
-def _value(value: object) -> str:
+def figure(drawing: str, name: str, note: str = "", *, wide: bool = False) -> str:
+    """Make a drawing with its caption, which stay together."""
+    kind = ' class="wide"' if wide else ""
+    caption = f"<b>{escape(name)}</b> {escape(note)}"
+    return f"<figure{kind}>{drawing}<figcaption>{caption}</figcaption></figure>"
+
+
+def _value(value: object, *, are_amounts: bool) -> str:
     if value is None:
         return DASH
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, int):
-        return f"{value:,}"
+        return f"{value:,}" if are_amounts else str(value)
     if isinstance(value, float):
         return f"{value:.6g}"
     if isinstance(value, list):
-        return ", ".join(_value(item) for item in value)
+        return ", ".join(_value(item, are_amounts=are_amounts) for item in value)
     return str(value)
 
 
@@ -231,6 +242,7 @@ def _amount(n: int) -> str:
     return f"{n / 1e6:.1f} M" if n >= 1_000_000 else f"{n:,}"
 
 
-def _clock(seconds: float) -> str:
+def clock(seconds: float) -> str:
+    """Write a duration."""
     whole = round(seconds)
     return f"{whole // 60}:{whole % 60:02d} min" if whole >= 60 else f"{seconds:.0f} s"

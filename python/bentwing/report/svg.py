@@ -9,21 +9,15 @@ import re
 from html import escape
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from bentwing.report.colours import gradient
 from bentwing.report.picture import encode_png
 from bentwing.report.way import draw_way
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from bentwing.report.picture import View
     from bentwing.report.way import Way
 
 INK, FAINT, GRID = "#3c4653", "#6b7684", "#e4e8ed"
-_MOST_POINTS = 1200  # of a path
-_JUMP = 1.0  # m from one drawn point to the next, beyond ten usual steps
 _VIEW_BOX = re.compile(r'viewBox="0 0 (\d+) (\d+)"')
 
 
@@ -35,6 +29,7 @@ def map_view(
     way: Way | None = None,
     name: str = "map",
     text_size: int = 20,
+    ends: tuple[str, str] | None = None,
 ) -> str:
     """Picture of a map with scale bar, colour legend and, if given, the carrier's way.
 
@@ -46,19 +41,26 @@ def map_view(
     way : of the carrier
     name : says what is seen, for those who cannot see it
     text_size : pixels of the picture
+    ends : what stands at the ends of the legend; default: the values there
     """
     height, width, _ = view.image.shape
+    wide = max(width, least_width(text_size))
     full = height + 24 + 2 * text_size
     data = base64.b64encode(encode_png(view.image)).decode("ascii")
     parts = [
-        open_svg(width, full, name),
+        open_svg(wide, full, name),
         f'<image width="{width}" height="{height}" href="data:image/png;base64,{data}"/>',
     ]
     if way is not None:
         parts.append(draw_way(view, way))
-    parts += _scale_bar(view, height + 24.0, text_size)
-    parts += _legend(view, value_label, table, (float(width), height + 14.0), text_size)
+    parts += scale_bar(view, height + 24.0, text_size)
+    parts += legend(view, value_label, table, (float(wide), height + 14.0), text_size, ends)
     return "".join([*parts, "</svg>"])
+
+
+def least_width(text_size: int) -> int:
+    """Return the pixels that scale bar and legend need beside each other."""
+    return 32 * text_size
 
 
 def nice_ticks(low: float, high: float, n: int) -> list[float]:
@@ -71,29 +73,8 @@ def nice_ticks(low: float, high: float, n: int) -> list[float]:
     return [i * step for i in range(first, last + 1)] or [low]
 
 
-def _path(view: View, across: NDArray[np.float64], up: NDArray[np.float64]) -> str:
-    every = max(len(across) // _MOST_POINTS, 1)
-    x = (across[::every] - view.left) / view.pixel
-    y = (view.top - up[::every]) / view.pixel
-    # Between two runs, or over a break, nobody flew.
-    steps = np.hypot(np.diff(x), np.diff(y)) * view.pixel
-    usual = float(steps.mean()) if len(steps) else 0.0
-    jumps = np.flatnonzero(steps > _JUMP + 10 * usual) + 1
-    pieces = zip(np.split(x, jumps), np.split(y, jumps), strict=True)
-    path = " ".join(_move(*piece) for piece in pieces)
-    line = f'<path d="{path}" fill="none" stroke-linejoin="round" '
-    start = f'<circle cx="{x[0]:.1f}" cy="{y[0]:.1f}" r="8" fill="#fff" stroke="#c8331e" stroke-width="4"/>'
-    return (
-        f'{line}stroke="#fff" stroke-width="7" stroke-opacity=".75"/>'
-        f'{line}stroke="#c8331e" stroke-width="3.6"/>{start}'
-    )
-
-
-def _move(x: NDArray[np.float64], y: NDArray[np.float64]) -> str:
-    return "M" + "L".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y, strict=True))
-
-
-def _scale_bar(view: View, y: float, text_size: int) -> list[str]:
+def scale_bar(view: View, y: float, text_size: int) -> list[str]:
+    """Draw a bar of a round length, at most a quarter of the picture."""
     width = view.image.shape[1]
     longest = width * view.pixel / 4
     magnitude = 10.0 ** math.floor(math.log10(longest))
@@ -105,29 +86,28 @@ def _scale_bar(view: View, y: float, text_size: int) -> list[str]:
     ]
 
 
-def _legend(
-    view: View, label: str, table: tuple[str, ...], corner: tuple[float, float], text_size: int
+def legend(  # noqa: PLR0917 - what, where and how large
+    view: View,
+    label: str,
+    table: tuple[str, ...],
+    corner: tuple[float, float],
+    text_size: int,
+    ends: tuple[str, str] | None = None,
 ) -> list[str]:
+    """Draw what the colours mean, with its upper right at a corner."""
     if len(set(table)) == 1:
         return []  # one colour shows nothing but the light
     right, y = corner
     identity = f"g{table[0]}"
     stops = "".join(gradient(table))
+    bar = 14 * text_size + 10
+    low, high = ends or (f"{round(v, 1) + 0.0:.1f}" for v in (view.low, view.high))
     return [
         f'<defs><linearGradient id="{identity}">{stops}</linearGradient></defs>',
-        f'<rect x="{right - 260}" y="{y}" width="256" height="10" rx="2" fill="url(#{identity})"/>',
-        text(
-            right - 260,
-            y + 16 + text_size,
-            f"{round(view.low, 1) + 0.0:.1f}",
-            "start",
-            INK,
-            text_size,
-        ),
-        text(
-            right - 4, y + 16 + text_size, f"{round(view.high, 1) + 0.0:.1f}", "end", INK, text_size
-        ),
-        text(right - 132, y + 16 + text_size, label, "middle", FAINT, text_size),
+        f'<rect x="{right - bar - 4}" y="{y}" width="{bar}" height="10" rx="2" fill="url(#{identity})"/>',
+        text(right - bar - 4, y + 16 + text_size, low, "start", INK, text_size),
+        text(right - 4, y + 16 + text_size, high, "end", INK, text_size),
+        text(right - bar - 14, y + 11, label, "end", FAINT, text_size),
     ]
 
 

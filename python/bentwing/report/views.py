@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bentwing.report.colours import HEIGHT, TIME
+from bentwing.report.frame import ShownFrame
 from bentwing.report.picture import paint, project, render
+from bentwing.report.plan import draw_plan
 from bentwing.report.stretches import degenerate
 from bentwing.report.svg import map_view
 from bentwing.report.way import Way
@@ -20,24 +22,31 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bentwing.base.trajectory import Trajectory
+    from bentwing.report.plan import Mark
 
 _WAY = ("1f2933", "c8412e")  # seen in all directions, and not
 SLAB = 1.0  # m, thickness of the section
 _HEADROOM = 0.3  # m above the sensor from which on a point counts as overhead
+_CEILING_BIN, _CEILING_ROOM = 0.05, 0.15  # m, and m of it that goes with the ceiling
 _NEAR = 2.0  # m beside the sensor within which overhead points tell a roof
 _ROOFED_SHARE = 0.5  # of the seconds; in the open almost nothing is ever right above the sensor
 
 
 @dataclass(frozen=True, slots=True)
 class MapViews:
-    """SVG drawings of one map, and the sentence that says what was left out of the plan."""
+    """SVG drawings of one map.
 
+    `ceiling` is the height, m, above which a view from above shows the roof only, None in the open;
+    `is_north_up` says whether the plan's y axis is grid north.
+    """
+
+    plan: str
     oblique: str
-    plan_height: str
     plan_time: str
     side: str
     section: str
-    plan_note: str
+    ceiling: float | None
+    is_north_up: bool
 
 
 def draw_views(
@@ -45,6 +54,9 @@ def draw_views(
     times: NDArray[np.float64],
     trajectory: Trajectory,
     windows: Sequence[Mapping[str, Any]] = (),
+    *,
+    frame: ShownFrame | None = None,
+    marks: Sequence[Mark] = (),
 ) -> MapViews:
     """Draw all views of a map.
 
@@ -54,6 +66,8 @@ def draw_views(
     times : (N,) s since the recording's start
     trajectory : of the IMU; drawn over the plan
     windows : records of the estimate; where one is degenerate the path is red
+    frame : of points and trajectory; default: the map's own
+    marks : surveyed points
     """
     overhead = overhead_points(points, times, trajectory)
     along, beside = _directions(points)
@@ -62,19 +76,20 @@ def draw_views(
     way = Way(path[:, 0], path[:, 1], unsure, _WAY)
     plan, plan_times = points[~overhead], times[~overhead]
     x, y, z = plan.T
-    from_above = project(x, y, z, width=800, max_height=800)
+    from_above = project(x, y, z, width=1100, max_height=760)
     by_height = paint(from_above, z)
     by_time = paint(from_above, plan_times, table=TIME, shading=0.5)
     centre = np.median(path, axis=0) if len(path) else np.zeros(3)
     slab = np.abs((points - centre) @ beside) < SLAB / 2
-    note = "Points above the sensor are left out, so that the roof does not hide the floor."
+    shown = frame or ShownFrame()
     return MapViews(
+        plan=draw_plan(by_height, shown, way=way, marks=marks),
         oblique=oblique_view(plan, plan[:, 2], "height, m"),
-        plan_height=map_view(by_height, "height, m", HEIGHT, way=way, name="Plan"),
         plan_time=map_view(by_time, "time, s", TIME, name="Plan by time"),
         side=_upright(points, along, beside, "Side view"),
         section=_upright(points[slab], along, beside, "Section"),
-        plan_note=note if overhead.any() else "",
+        ceiling=ceiling_of(points[overhead, 2]),
+        is_north_up=shown.is_north_up,
     )
 
 
@@ -93,6 +108,15 @@ def overhead_points(
     seconds = np.floor(when[np.hypot(*beside) < _NEAR])
     roofed = len(np.unique(seconds)) > _ROOFED_SHARE * len(np.unique(np.floor(times)))
     return above if roofed else np.zeros(len(points), np.bool_)
+
+
+def ceiling_of(heights: NDArray[np.float64]) -> float | None:
+    """Return a height just below most of the points (N,) m that are overhead; None without any."""
+    if not len(heights):
+        return None
+    bins = np.floor(heights / _CEILING_BIN).astype(np.int64)
+    levels, counts = np.unique(bins, return_counts=True)
+    return float(levels[counts.argmax()] * _CEILING_BIN - _CEILING_ROOM)
 
 
 def _followed(trajectory: Trajectory, times: NDArray[np.float64], axis: int) -> NDArray[np.float64]:
@@ -133,7 +157,7 @@ def oblique_view(
     if path is not None:
         way = Way(path @ across, path @ up, np.linspace(0.0, 1.0, len(path)), TIME)
     view = paint(seen, values, table=table)
-    return map_view(view, label, table, way=way, name="Oblique view", text_size=13)
+    return map_view(view, label, table, way=way, name="Oblique view", text_size=22)
 
 
 def _upright(
@@ -145,7 +169,7 @@ def _upright(
     across, up, toward = points @ along, points[:, 2], -(points @ beside)
     # gaps stay, because closing them would make walls look thicker than they are
     view = render(across, up, toward, up, max_height=420, close_gaps=0)
-    return map_view(view, "height, m", HEIGHT, name=name, text_size=13)
+    return map_view(view, "height, m", HEIGHT, name=name, text_size=22)
 
 
 def _directions(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

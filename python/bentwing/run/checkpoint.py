@@ -42,8 +42,8 @@ _COVARIANCES = ("covariance_times", "covariance_matrices")
 _SHORT = "short_variances"
 _OF_ESTIMATE = ("windows", "counts", "timings", "health", "notes", "breaks", "segments")
 _CORRECTIONS = ("localization", "loop_closure", "merging")
-# What must be the same for a run to go on; the number of threads changes no bit.
-_FREE = frozenset({"threads"})
+# What must be the same for a run to go on; the number of threads and names in the report change no bit.
+_FREE = frozenset({"threads", "project"})
 STAGES = ("estimate", "loops")
 _DIGEST = hashlib.sha256().digest_size
 # What reading something that bentwing has not written ends in.

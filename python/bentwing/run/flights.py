@@ -63,6 +63,7 @@ def map_flights(
         map_spacing=settings.map_spacing,
         cleaning=settings.cleaning,
         georeferencing=settings.georeferencing,
+        project=settings.project,
         threads=settings.threads,
         loop_closure=settings.closing,
         flights={n: [resolved(p) for p in f] for n, f in zip(names, flights, strict=True)},
@@ -99,7 +100,7 @@ def _is_mapped(run: Path, paths: Sequence[Path], settings: RunSettings) -> bool:
     except UsageError:
         return False
     # Where the head had to be found, the run has another payload than was asked for.
-    free = {"threads", "payload"} if record.get("set_up") else {"threads"}
+    free = {"threads", "project", *(["payload"] if record.get("set_up") else [])}
     used, wanted = (
         {name: value for name, value in described.items() if name not in free}
         for described in (record.get("settings") or {}, settings.to_json())

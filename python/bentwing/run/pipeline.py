@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from bentwing import odometry
 from bentwing.base.progress import as_progress
+from bentwing.recording.sections.project import as_project
 from bentwing.run import stages
 from bentwing.run.beams import read_by
 from bentwing.run.check import opened
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from bentwing.map.clean import CleanSettings
     from bentwing.odometry import EstimatorName, EstimatorSettings
     from bentwing.recording.payload import PayloadLike
+    from bentwing.recording.sections.project import Project
     from bentwing.run.found import Found
     from bentwing.run.settings import RunSettings
 
@@ -45,6 +47,7 @@ def map_recording(
     map_spacing: float | None = None,
     cleaning: CleanSettings | None = None,
     georeferencing: GeoreferenceSettings | None = None,
+    project: Project | Path | str | None = None,
     loop_closure: bool = True,
     write_map: bool = True,
     prior_map: Path | str | None = None,
@@ -70,6 +73,7 @@ def map_recording(
     cleaning : what the map leaves out; default: mixed pixels and what moved
     georeferencing : how GNSS fixes and control points are used; default: fixes, where the payload
         names their topic, as a rigid fit
+    project : what the first page of the report names, or a YAML file of it; default: the payload's
     loop_closure : whether places seen again may correct the trajectory
     write_map : whether there is a map; without one the run ends with its trajectory, much sooner
     prior_map : a run folder or a cloud in which the recording is localized: trajectory and map are
@@ -96,6 +100,7 @@ def map_recording(
         map_spacing=map_spacing,
         cleaning=cleaning,
         georeferencing=georeferencing,
+        project=as_project(project),
         loop_closure=None if loop_closure else False,
         writes_map=None if write_map else False,
         prior_map=prior_map,

@@ -39,6 +39,7 @@ class RunRecord:
     files : names of the results in the folder
     hashes : size and SHA-256 of these, once the run is complete
     timings : s of wall time by stage
+    cost : time and memory as the report tells them; None until it is drawn
     found : what the stages have found
     """
 
@@ -52,6 +53,7 @@ class RunRecord:
     files: list[str] = field(default_factory=list)
     hashes: dict[str, dict[str, Any]] = field(default_factory=dict)
     timings: dict[str, float] = field(default_factory=dict)
+    cost: dict[str, Any] | None = None
     found: Found = field(default_factory=Found)
     started: str = field(default_factory=_now)
     _since: float = field(default_factory=time.monotonic)
@@ -60,10 +62,27 @@ class RunRecord:
         """Add to the time that a stage has taken."""
         self.timings[stage] = self.timings.get(stage, 0.0) + seconds
 
+    def settle(self, report_seconds: float) -> dict[str, Any]:
+        """Measure time and memory for the last time, so that the report and run.json say the same.
+
+        Parameters
+        ----------
+        report_seconds : that drawing the report has taken
+        """
+        self.timings["report"] = report_seconds
+        self.cost = self._cost()
+        return self.cost
+
+    def _cost(self) -> dict[str, Any]:
+        total = time.monotonic() - self._since
+        return {
+            "timings": {**self.timings, **self.found.timings, "total": total},
+            "peak_memory_mb": round(_peak_memory() / 1e6, 1),
+        }
+
     def to_json(self) -> dict[str, Any]:
         """Return the record in plain JSON types."""
         found = self.found.to_json()
-        total = time.monotonic() - self._since
         described: dict[str, Any] = plain(
             {
                 "kind": RUN_FOLDER.kind,
@@ -79,9 +98,8 @@ class RunRecord:
                 "start_ns": self.start_ns,
                 "files": self.files,
                 "hashes": self.hashes,
-                "timings": {**self.timings, **self.found.timings, "total": total},
                 **found,
-                "peak_memory_mb": round(_peak_memory() / 1e6, 1),
+                **(self.cost or self._cost()),
             }
         )
         return described

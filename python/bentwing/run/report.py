@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -28,9 +29,9 @@ def report_run(folder: RunFolder, found: Found, trajectory: Trajectory | None = 
     ----------
     trajectory : of the map; default: of the estimate
     """
-    with folder.stage("report"):
-        folder.save()
-        _write(folder, found, trajectory, complete=True)
+    folder.record.stage = "report"
+    folder.save()
+    _write(folder, found, trajectory, complete=True)
 
 
 def say_warnings(progress: Progress, warnings: Iterable[str]) -> None:
@@ -55,7 +56,12 @@ def _write(
 
     if trajectory is None:
         trajectory = _NOWHERE if found.estimate is None else found.estimate.trajectory
+    started = time.monotonic()
     points, times = found.sample.points, found.sample.times
+    if len(points):
+        overhead = overhead_points(points, times, trajectory)
+        seen = points[~overhead] if overhead.any() else points
+        write_png(folder.file("map_top.png"), render_top(seen))
     write_report(
         folder.file("report.html"),
         run_json={**folder.described(), "complete": complete},
@@ -63,8 +69,5 @@ def _write(
         map_sample=(points, times),
         revisits=None if found.map is None else found.map.revisits,
         spin=found.spin.series,
+        cost=lambda: folder.record.settle(time.monotonic() - started),
     )
-    if len(points):
-        overhead = overhead_points(points, times, trajectory)
-        seen = points[~overhead] if overhead.any() else points
-        write_png(folder.file("map_top.png"), render_top(seen))

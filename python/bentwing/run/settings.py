@@ -29,6 +29,7 @@ from bentwing.odometry import (
     require_estimator,
 )
 from bentwing.recording import Payload
+from bentwing.recording.sections.project import Project  # noqa: TC001 - pydantic reads it
 
 MOST_SECONDS = 1e9
 """No recording lasts for thirty years."""
@@ -51,6 +52,9 @@ class MapSettings(Settings):
     cleaning: CleanSettings = Field(default=CleanSettings(), description="what the map leaves out")
     georeferencing: GeoreferenceSettings = Field(
         default=GeoreferenceSettings(), description="how GNSS fixes and control points are used"
+    )
+    project: Project | None = Field(
+        default=None, description="what the first page of the report names; default: the payload's"
     )
     threads: int | None = Field(
         default=None, ge=1, le=MOST_THREADS, description="number of threads; default: all cores"

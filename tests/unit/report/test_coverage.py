@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
+import re
+
 import numpy as np
 import pytest
 
@@ -96,3 +98,12 @@ def test_a_way_changes_its_colour_where_its_value_does():
     by_time = draw_way(view, Way(x, x, np.linspace(0, 1, 11), TIME))
     assert by_time.count("<polyline") == 1 + 11
     assert draw_way(view, Way(x[:0], x[:0])) == ""
+
+
+def test_a_way_is_not_drawn_where_nobody_flew():
+    view = View(np.zeros((50, 50, 3), np.uint8), 1.0, 0.0, 50.0, 0.0, 1.0)
+    x = np.r_[np.linspace(0, 5, 60), np.linspace(30, 35, 60)]
+    drawn = draw_way(view, Way(x, 0 * x + 10))
+    lines = [re.findall(r"([\d.]+),", points) for points in re.findall(r'points="([^"]*)"', drawn)]
+    assert len(lines) == 4  # casing and line of two stretches
+    assert all(float(line[-1]) - float(line[0]) < 6 for line in lines)

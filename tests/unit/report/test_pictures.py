@@ -7,9 +7,11 @@ import pytest
 from PIL import Image
 
 from bentwing.base.errors import UsageError
+from bentwing.report.colours import HEIGHT
 from bentwing.report.geotiff import write_geotiff
-from bentwing.report.lettering import bar_length, with_scale, write
+from bentwing.report.lettering import Lettering, bar_length, coordinate, lettered, multiples, write
 from bentwing.report.picture import View, project
+from bentwing.report.view.pictures import round_projection
 
 
 def view(rows=130, columns=300, pixel=0.05):
@@ -25,16 +27,42 @@ def test_the_bar_is_a_round_length_of_at_most_a_quarter(pixel):
     assert f"{metres:e}"[0] in "125"
 
 
-def test_the_picture_stays_as_it_is_above_bar_and_arrow():
+def test_around_the_picture_are_grid_bar_legend_and_arrow():
     shown = view()
-    image = with_scale(shown, "N")
-    assert np.array_equal(image[:130, :300], shown.image)
-    foot = image[130:]
+    image = lettered(shown, Lettering("PLAN", "N", "m", HEIGHT))
+    inside = image[44:174, 200:500]
+    is_line = (inside != shown.image).any(axis=2)
+    columns, rows = (np.flatnonzero(is_line.all(axis=axis)) for axis in (0, 1))
+    # 15 by 6.5 m: lines each 5 m, at coordinates that are multiples of it
+    assert columns.tolist() == [0, 100, 200, 299]
+    assert rows.tolist() == [0, 100]
+    assert np.array_equal(inside[~is_line], shown.image[~is_line])
+    foot = image[174:]
     dark = (foot < 255).any(axis=2)
     metres, pixels = bar_length(shown.pixel, 300)
-    longest = max(len(run) for run in "".join("#" if d else " " for d in dark[25]).split())
+    longest = max(len(run) for run in "".join("#" if d else " " for d in dark[67, :600]).split())
     assert (metres, longest) == (2.0, pixels)
-    assert dark[:, 250:].any()
+    legend = foot[60, -316:-16].astype(int)
+    assert len(np.unique(legend, axis=0)) > 100
+    assert (image[44:90, 16:60] < 255).any()
+
+
+def test_the_grid_has_round_coordinates():
+    assert multiples(-3.2, 7.1, 2.5) == [-2.5, 0.0, 2.5, 5.0]
+    assert [coordinate(v) for v in (-0.0, 2.5, 12.0, 631_020.0)] == ["0", "2.5", "12", "631,020"]
+
+
+def test_a_pixel_is_a_round_length():
+    rng = np.random.default_rng(0)
+    for size in (0.7, 33.0, 4000.0):
+        x, y = rng.uniform(-size, size, (2, 5000))
+        seen = round_projection(x, y, np.zeros(5000))
+        digits = f"{seen.pixel:e}"
+        assert digits[0] in "125"
+        assert digits[1:8] == ".000000"
+        assert seen.left / seen.pixel == pytest.approx(round(seen.left / seen.pixel), abs=1e-6)
+        assert max(seen.front.shape[1] / 2400, seen.front.shape[0] / 1800) > 0.35
+        assert (seen.front >= 0).sum() > 1000
 
 
 def test_letters_are_drawn_and_cut_at_the_edge():

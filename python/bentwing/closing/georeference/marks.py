@@ -115,13 +115,16 @@ class Marks:
     def table(self, placement: Placement, before: Sequence[float | None]) -> list[dict[str, Any]]:
         """Return one row per mark for run.json and the report."""
         rows = []
-        after = self.residuals(placement)
-        for mark, plane, first, last in zip(self.listed, self.planes, before, after, strict=True):
+        after, places = self.residuals(placement), placement.to_map(self.targets)
+        for mark, plane, place, first, last in zip(
+            self.listed, self.planes, places, before, after, strict=True
+        ):
             normal = None if plane is None else placement.rotation @ plane.normal
             rows.append(
                 {
                     "id": mark.name,
                     "use": mark.use,
+                    "in_map": place,
                     "points": 0 if plane is None else plane.n_points,
                     "normal": normal,
                     "thickness": None if plane is None else plane.thickness,

@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bentwing.base.run_record import finished_record, understood
-from bentwing.base.trajectory import Trajectory, read_tum
 from bentwing.evaluate.surfels import Surfels, surfels_of_cloud
-from bentwing.map.formats import MAP_SUFFIXES
 from bentwing.map.gps_time import adjusted_gps_origin
 from bentwing.map.read import read_parts
+from bentwing.report.finished import map_of, trajectory_of
 from bentwing.report.view.levels import FINEST, Level, LevelPoints, coarser_levels
 
 if TYPE_CHECKING:
@@ -23,6 +22,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bentwing.base.progress import Stage
+    from bentwing.base.trajectory import Trajectory
 
 SURFEL_EDGE = 0.4
 """m, of the surfels that are shown, the finest level of the estimator."""
@@ -77,23 +77,6 @@ def read_contents(folder: Path, most: int, shown: Stage) -> Contents:
     )
     levels = [finest.result, *coarser_levels(finest.result, _N_COARSER)]
     return Contents(levels, surfels, trajectory, record.get("windows") or [])
-
-
-def trajectory_of(path: Path, record: dict[str, Any]) -> tuple[Trajectory, int]:
-    """Return the trajectory and the recording's start, ns."""
-    absolute, first_ns = read_tum(path)
-    begin = float((record.get("segments") or [[0.0]])[0][0])
-    times = absolute.times + begin
-    return (
-        Trajectory(times, absolute.positions, absolute.quats_xyzw),
-        first_ns - round(begin * 1e9),
-    )
-
-
-def map_of(folder: Path) -> Path | None:
-    """Return the map of a run folder."""
-    maps = [folder / f"map{suffix}" for suffix in MAP_SUFFIXES]
-    return next((path for path in maps if path.exists()), None)
 
 
 def _watched(

@@ -4,21 +4,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
 from bentwing.base.errors import InputError
-from bentwing.base.run_record import finished_record
 from bentwing.base.trajectory import Trajectory
 from bentwing.map.epsg import epsg_of_map
-from bentwing.map.gps_time import adjusted_gps_origin
-from bentwing.map.read import read_parts
+from bentwing.report.colours import HEIGHT as HEIGHTS
 from bentwing.report.colours import TIME
+from bentwing.report.finished import FinishedRun
+from bentwing.report.frame import ShownFrame
 from bentwing.report.geotiff import write_geotiff
-from bentwing.report.lettering import with_scale
-from bentwing.report.picture import View, paint, project, write_png
-from bentwing.report.view.contents import map_of, trajectory_of
+from bentwing.report.lettering import Lettering, lettered
+from bentwing.report.picture import Projection, View, frame_of, paint, project, write_png
 from bentwing.report.view.levels import FINEST, Level
 from bentwing.report.views import SLAB, overhead_points
 
@@ -31,6 +30,8 @@ if TYPE_CHECKING:
 
 WIDTH, HEIGHT = 2400, 1800  # pixels at most
 _MOST = 5_000_000  # points
+_FINEST = 0.001  # m, edge of a pixel at least
+_ROUND = [m * 10.0**e for e in range(-3, 5) for m in (1, 2, 5)]  # m, edges of a pixel
 _APART = 100.0  # m beyond the map at which a trajectory is in another frame
 
 
@@ -63,65 +64,108 @@ def read_pictured(run: Path, most: int = _MOST) -> Pictured:
     InputError
         If it has no map, or its map or trajectory cannot be read.
     """
-    record = finished_record(run)
-    path = map_of(run)
-    if path is None:
+    finished = FinishedRun.open(run)
+    if finished.map is None:
         msg = (
             f"{run}: the run has no map; run `bentwing map` again, to its end and without --no-map"
         )
         raise InputError(msg)
-    trajectory, origin_ns = trajectory_of(run / "trajectory.txt", record)
-    begin = adjusted_gps_origin(origin_ns) if path.suffix in {".laz", ".las"} else 0.0
+    frame = ShownFrame.of(finished.record.get("georeference"))
     level = Level(FINEST, most)
-    origin: NDArray[np.float64] | None = None
-    for part in read_parts(path):
-        if origin is None:  # geographic coordinates are too large for single precision
-            origin = np.round(np.median(part.points, axis=0))
-        times = np.zeros(len(part.points)) if part.times is None else part.times - begin
-        level.add(part.points - origin, times)
+    origin = frame.origin if frame.origin.any() else None
+    for places, times in finished.parts():
+        shown = frame.points(places)
+        if origin is None:  # coordinates may be too large for single precision
+            origin = np.round(np.median(shown, axis=0))
+            frame = replace(frame, place=frame.place - origin)
+            shown = shown - origin
+        level.add(shown, times)
     points = level.result.points.astype(np.float64)
     if origin is None or not len(points):
-        msg = f"{path}: holds no point; give a run with a map"
+        msg = f"{finished.map}: holds no point; give a run with a map"
         raise InputError(msg)
-    local = replace(trajectory, positions=trajectory.positions - origin)
+    local = frame.trajectory(finished.trajectory)
     if _elsewhere(local.positions, points):
         local = Trajectory(np.empty(0), np.empty((0, 3)), np.empty((0, 4)))
     order = np.argsort(level.result.times, kind="stable")
-    return Pictured(points[order], level.result.times[order], local, origin, epsg_of_map(path))
+    epsg = epsg_of_map(finished.map)
+    return Pictured(points[order], level.result.times[order], local, origin, epsg)
 
 
 def write_pictures(run: Path, out: Path, progress: Progress) -> list[Path]:
     """Write top.png, top_time.png, section_along.png and section_across.png, and top.tif if georeferenced.
 
-    All are orthographic, in ambient and eye-dome light, with a scale bar. Sections are cut
-    through the middle of the way, `SLAB` thick.
+    All are orthographic, in ambient and eye-dome light, with title, grid, scale bar and legend; a pixel
+    is a round length. Sections are cut through the middle of the way, `SLAB` thick.
     """
     with progress.stage("reading the map"):
         what = read_pictured(run)
     out.mkdir(parents=True, exist_ok=True)
-    written: list[Path] = []
-
-    def keep(name: str, view: View, up: str) -> None:
-        write_png(out / name, with_scale(view, up))
-        written.append(out / name)
-
     with progress.stage("drawing"):
-        seen = ~overhead_points(what.points, what.times, what.trajectory)
-        x, y, z = what.points[seen].T
-        top = project(x, y, z, width=WIDTH, max_height=HEIGHT)
-        up = "y" if what.epsg is None else "N"
-        by_height = paint(top, z)
-        keep("top.png", by_height, up)
-        keep("top_time.png", paint(top, what.times[seen], table=TIME, shading=0.5), up)
-        for name, axis in (("section_along", 0), ("section_across", 1)):
-            keep(f"{name}.png", section(what, axis), "z")
+        name, top = run.resolve().name.upper(), _plans(what)
+        drawn = {**top, **_sections(what)}
+        for file, (view, words) in drawn.items():
+            write_png(out / file, lettered(view, replace(words, title=f"{name}: {words.title}")))
+        written = [out / file for file in drawn]
         if what.epsg is not None:
-            placed = replace(
-                by_height, left=by_height.left + what.origin[0], top=by_height.top + what.origin[1]
-            )
+            view, _ = top["top.png"]
+            placed = replace(view, left=view.left + what.origin[0], top=view.top + what.origin[1])
             write_geotiff(out / "top.tif", placed, what.epsg)
             written.append(out / "top.tif")
     return written
+
+
+Drawings: TypeAlias = "dict[str, tuple[View, Lettering]]"
+
+
+def _plans(what: Pictured) -> Drawings:
+    """Draw the map from above, without what is above the sensor under a roof."""
+    seen = ~overhead_points(what.points, what.times, what.trajectory)
+    x, y, z = what.points[seen].T
+    top = round_projection(x, y, z)
+    up, place = "y" if what.epsg is None else "N", (float(what.origin[0]), float(what.origin[1]))
+    by_time = paint(top, what.times[seen], table=TIME, shading=0.5)
+    return {
+        "top.png": (
+            _raised(paint(top, z), what),
+            Lettering("PLAN, HEIGHT", up, "m", HEIGHTS, place),
+        ),
+        "top_time.png": (by_time, Lettering("PLAN, TIME", up, "s", TIME, place)),
+    }
+
+
+def _sections(what: Pictured) -> Drawings:
+    drawings = {}
+    for file, axis, name in (("section_along", 0, "x"), ("section_across", 1, "y")):
+        title = f"SECTION {SLAB:g} m THICK, {name} TO THE RIGHT"
+        place = float(what.origin[axis]), float(what.origin[2])
+        words = Lettering(title, "z", "m", HEIGHTS, place)
+        drawings[f"{file}.png"] = _raised(section(what, axis), what), words
+    return drawings
+
+
+def _raised(view: View, what: Pictured) -> View:
+    """Give the ends of the legend the heights that the map has."""
+    up = float(what.origin[2])
+    return replace(view, low=view.low + up, high=view.high + up)
+
+
+def round_projection(
+    across: NDArray[np.float64],
+    up: NDArray[np.float64],
+    toward: NDArray[np.float64],
+    close_gaps: int = 3,
+) -> Projection:
+    """Project points so that a pixel is a round length, and its edges lie at multiples of it."""
+    left, right, bottom, top = frame_of(across, up)
+    least = max((right - left) / WIDTH, (top - bottom) / HEIGHT, _FINEST)
+    pixel = next(p for p in _ROUND if p >= least * 0.999)
+    left, bottom = pixel * np.floor(left / pixel), pixel * np.floor(bottom / pixel)
+    columns, rows = int(np.ceil((right - left) / pixel)), int(np.ceil((top - bottom) / pixel))
+    frame = (left, left + columns * pixel, bottom, bottom + rows * pixel)
+    return project(
+        across, up, toward, width=columns, max_height=rows, close_gaps=close_gaps, frame=frame
+    )
 
 
 def section(what: Pictured, axis: int) -> View:
@@ -130,9 +174,9 @@ def section(what: Pictured, axis: int) -> View:
     centre = np.median(path if len(path) else what.points, axis=0)
     slab = np.abs(what.points[:, 1 - axis] - centre[1 - axis]) < SLAB / 2
     x, y, z = what.points[slab].T
-    across, toward = (x, -y) if axis == 0 else (-y, -x)
+    across, toward = (x, -y) if axis == 0 else (y, x)
     # gaps stay, because closing them would make walls look thicker than they are
-    return paint(project(across, z, toward, width=WIDTH, max_height=HEIGHT, close_gaps=0), z)
+    return paint(round_projection(across, z, toward, close_gaps=0), z)
 
 
 def _elsewhere(path: NDArray[np.float64], points: NDArray[np.float64]) -> bool:

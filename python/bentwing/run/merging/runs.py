@@ -19,6 +19,7 @@ from bentwing.closing.joining.matches import Part, find_matches, parts_of
 from bentwing.closing.joining.placing import place_groups
 from bentwing.closing.joining.survey import Survey, survey
 from bentwing.map.clean import CleanSettings
+from bentwing.recording.sections.project import as_project
 from bentwing.run.check import require_coordinates, require_effect
 from bentwing.run.folder import RunFolder
 from bentwing.run.found import Found
@@ -30,6 +31,7 @@ from bentwing.run.settings import merge_settings
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
 
+    from bentwing.recording.sections.project import Project
     from bentwing.run.settings import MergeSettings
 
 
@@ -57,6 +59,7 @@ def merge(
     map_spacing: float = 0.0,
     cleaning: CleanSettings | None = None,
     georeferencing: GeoreferenceSettings | None = None,
+    project: Project | Path | str | None = None,
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> Merged:
@@ -77,6 +80,7 @@ def merge(
         flown or between the runs
     georeferencing : how the GNSS fixes of all runs and control points are used; what is not given is
         as in the runs, where they agree
+    project : what the first page of the report names, or a YAML file of it; default: the first run's
     threads : default: all cores
     progress : what to tell the user meanwhile; default: nothing
 
@@ -89,13 +93,15 @@ def merge(
         map_spacing=map_spacing,
         cleaning=cleaning or CleanSettings(),
         georeferencing=georeferencing or GeoreferenceSettings(),
+        project=as_project(project),
         threads=threads,
         runs=[resolved(Path(run)) for run in runs],
     )
     require_coordinates(settings.georeferencing)
     sources = open_sources([Path(run) for run in runs])
     wanted = settings_of_runs(settings.georeferencing, sources)
-    settings = settings.model_copy(update={"georeferencing": wanted})
+    named = settings.project or next((s.project for s in sources if s.project is not None), None)
+    settings = settings.model_copy(update={"georeferencing": wanted, "project": named})
     is_placed = any(source.payload.gnss is not None for source in sources)
     require_effect(wanted, "these runs", is_placed=is_placed)
     if any(resolved(Path(out)) == resolved(source.folder) for source in sources):

@@ -20,6 +20,7 @@ from bentwing.closing.georeference.settings import GeoreferenceSettings
 from bentwing.map.project import project
 from bentwing.recording import Payload, Recording
 from bentwing.recording.preprocess import RecordingPart
+from bentwing.recording.sections.project import project_in
 from bentwing.run.mapping import MapSource
 from bentwing.run.run import estimate_of, require_single, verdict_in
 
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from bentwing.base.progress import Progress
     from bentwing.evaluate.verdict import Reason, Verdict
     from bentwing.map.chunk import MapChunk
+    from bentwing.recording.sections.project import Project
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +46,7 @@ class Source:
     start, duration : s, the part of the recording that was used; None for all of it
     force : whether the run mapped the recording although it is unfit
     georeferencing : how the run used GNSS fixes and control points
+    project : what its report names
     start_ns : time zero of the recording, ns UTC
     inputs : what run.json says about the files
     warnings, verdict : of the run
@@ -58,6 +61,7 @@ class Source:
     payload: Payload
     force: bool
     georeferencing: GeoreferenceSettings
+    project: Project | None
     estimate: Estimate
     inputs: list[dict[str, Any]]
     warnings: list[str]
@@ -172,6 +176,7 @@ def _source(folder: Path, name: str, record: dict[str, Any]) -> Source:
         _payload(folder, settings),
         bool(settings.get("force")),
         GeoreferenceSettings.model_validate(settings.get("georeferencing") or {}),
+        project_in(record),
         estimate_of(folder, record),
         record["inputs"],
         list(record.get("warnings") or []),

@@ -1,4 +1,5 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
+import json
 import sys
 
 import laspy
@@ -13,6 +14,7 @@ from bentwing.map.epsg import epsg_of_map
 from bentwing.map.writer import open_map
 from bentwing.report.view import view_run, write_frames, write_pictures
 from bentwing.report.view.levels import Level, coarser_levels
+from bentwing.report.view.pictures import read_pictured
 from bentwing.run.folder import RunFolder
 
 
@@ -126,3 +128,16 @@ def test_frames_show_the_map_grow(tmp_path):
     frames = write_frames(run, tmp_path / "out", 3, Progress())
     assert [path.name for path in frames] == [f"frame_000{k}.png" for k in (1, 2, 3)]
     assert frames[0].stat().st_size < frames[2].stat().st_size
+
+
+def test_pictures_of_a_merged_map_have_the_ways_of_all_its_runs(tmp_path):
+    run = run_folder(tmp_path / "site")
+    record = json.loads((run / "run.json").read_text())
+    for name in ("a", "b"):
+        (run / f"trajectory_{name}.txt").write_text((run / "trajectory.txt").read_text())
+    (run / "trajectory.txt").unlink()
+    record["runs"] = [{"name": n, "trajectory": f"trajectory_{n}.txt"} for n in ("a", "b")]
+    (run / "run.json").write_text(json.dumps(record))
+    written = write_pictures(run, tmp_path / "out", Progress())
+    assert {path.name for path in written} >= {"top.png", "section_across.png"}
+    assert len(read_pictured(run).trajectory.times) == 200

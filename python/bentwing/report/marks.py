@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""Control and check points on the first page: their residuals, and where they are on the plan."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bentwing.report.plan import Mark
+from bentwing.report.sections import DASH, MINUS, table
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from bentwing.report.frame import ShownFrame
+    from bentwing.report.texts import Texts
+
+_LEVEL, _UPRIGHT = 0.9, 0.3  # of the upward part of a normal: floors beyond, walls below
+
+
+def marks_of(georeference: Mapping[str, Any] | None, frame: ShownFrame) -> list[Mark]:
+    """Return the marks where the plan shows them."""
+    rows = [row for row in _rows(georeference) if row.get("in_map") is not None]
+    if not rows:
+        return []
+    places = frame.points(np.array([row["in_map"] for row in rows], np.float64))
+    return [
+        Mark(str(row["id"]), (float(x), float(y)), is_check=row["use"] == "check")
+        for row, (x, y, _) in zip(rows, places, strict=True)
+    ]
+
+
+def marks_section(georeference: Mapping[str, Any] | None, texts: Texts) -> str:
+    """Make the table of residuals with what they come to; empty without any."""
+    rows = _rows(georeference)
+    if not rows:
+        return ""
+    left = (georeference or {}).get("residuals") or {}
+    said = [
+        text.format(n=found["n"], rms=1e3 * found["rms"], most=1e3 * found["max"])
+        for use, text in (("control", texts.marks_control), ("check", texts.marks_check))
+        if (found := left.get(use))
+    ]
+    return (
+        f"<section><h2>{escape(texts.marks)}</h2><p><b>{escape(' '.join(said))}</b> "
+        f"{escape(texts.marks_note)}</p>{_table(rows, texts)}</section>"
+    )
+
+
+def _table(rows: Sequence[Mapping[str, Any]], texts: Texts) -> str:
+    is_picked = any(row.get("picked_off") is not None for row in rows)
+    cells = [
+        (
+            str(row["id"]),
+            texts.uses.get(str(row["use"]), str(row["use"])),
+            _across(row["normal"], texts),
+            _millimetres(row["before"]),
+            _millimetres(row["residual"]),
+            *([_millimetres(row.get("picked_off"))] if is_picked else []),
+        )
+        for row in rows
+    ]
+    head = (texts.mark, texts.use, texts.across, texts.before, texts.residual)
+    return table(
+        (*head, *([texts.picked] if is_picked else [])), cells, numbers=frozenset({3, 4, 5})
+    )
+
+
+def _across(normal: Sequence[float] | None, texts: Texts) -> str:
+    if normal is None:
+        return texts.not_used
+    upward = abs(normal[2])
+    if upward > _LEVEL:
+        return texts.heights
+    return texts.sideways if upward < _UPRIGHT else texts.mixed
+
+
+def _millimetres(value: float | None) -> str:
+    if value is None:
+        return DASH
+    rounded = round(1000 * value, 1)
+    return f"{rounded:+.1f}".replace("-", MINUS) if rounded else "0.0"
+
+
+def _rows(georeference: Mapping[str, Any] | None) -> Sequence[Mapping[str, Any]]:
+    return (georeference or {}).get("control_points") or []

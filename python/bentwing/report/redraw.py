@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""The report of a finished run drawn again: with another project, after an update, or for paper."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bentwing.base.atomic import write_text
+from bentwing.base.folder_lock import FolderLock
+from bentwing.base.plain import plain
+from bentwing.base.progress import as_progress
+from bentwing.base.provenance import describe_input
+from bentwing.base.run_record import RECORD
+from bentwing.evaluate.revisits import revisit_consistency
+from bentwing.report.finished import FinishedRun
+from bentwing.report.page import write_report
+from bentwing.report.pdf import find_browser, write_pdf
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from bentwing.base.progress import Progress
+    from bentwing.recording.sections.project import Project
+
+PAGE, PAPER = "report.html", "report.pdf"
+_MOST = 1_200_000  # points; a run's first report shows as many
+
+
+def redraw_report(
+    run: Path | str,
+    *,
+    project: Project | None = None,
+    pdf: bool = False,
+    progress: Progress | None = None,
+) -> list[Path]:
+    """Draw the report of a finished run again, into its folder.
+
+    Parameters
+    ----------
+    run : folder that `bentwing map`, `merge` or `localize` has written
+    project : what the first page names; default: as before
+    pdf : whether it is printed as report.pdf, too
+    progress : what to tell the user meanwhile
+
+    Returns
+    -------
+    The files that were written.
+
+    Raises
+    ------
+    UsageError
+        If it is no complete run, another process writes there, or no browser can print.
+    InputError
+        If a file in it cannot be read.
+    """
+    browser = find_browser() if pdf else None
+    shown, finished = as_progress(progress), FinishedRun.open(run)
+    folder, record = finished.folder, finished.record
+    if project is not None:
+        record["project"] = plain(project.model_dump())
+    lock = FolderLock(folder)
+    lock.acquire()
+    try:
+        _forget(folder, record)
+        with shown.stage("draw the report"):
+            points, times = _sample(finished)
+            write_report(
+                folder / PAGE,
+                run_json=record,
+                trajectory=finished.trajectory,
+                map_sample=(points, times),
+                revisits=revisit_consistency(points, times) if len(points) else None,
+            )
+        written = [folder / PAGE]
+        if browser is not None:
+            with shown.stage("print the report"):
+                write_pdf(folder / PAGE, folder / PAPER, browser)
+            written.append(folder / PAPER)
+        for path in written:
+            _remember(folder, record, path)
+    finally:
+        lock.release()
+    return written
+
+
+def _sample(finished: FinishedRun) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return every k-th point of the map and its time, in the order of time."""
+    n = int((finished.record.get("counts") or {}).get("map.written", 0))
+    step = 1
+    while n > step * _MOST:
+        step *= 2
+    skipped = 0
+    points, times = [np.empty((0, 3))], [np.empty(0)]
+    for places, moments in finished.parts():
+        chosen = slice(-skipped % step, None, step)
+        points.append(places[chosen])
+        times.append(moments[chosen])
+        skipped += len(places)
+    return np.concatenate(points), np.concatenate(times)
+
+
+def _forget(folder: Path, record: dict[str, Any]) -> None:
+    """Let the record vouch for no report while that is written."""
+    for name in (PAGE, PAPER):
+        record.get("hashes", {}).pop(name, None)
+    if PAPER in record.get("files", []):
+        record["files"].remove(PAPER)
+        (folder / PAPER).unlink(missing_ok=True)
+    _save(folder, record)
+
+
+def _remember(folder: Path, record: dict[str, Any], path: Path) -> None:
+    found = describe_input(path)
+    record.setdefault("hashes", {})[path.name] = {
+        key: found[key] for key in ("bytes", "sha256", "hashed")
+    }
+    if path.name not in record.setdefault("files", []):
+        record["files"].append(path.name)
+    _save(folder, record)
+
+
+def _save(folder: Path, record: dict[str, Any]) -> None:
+    write_text(folder / RECORD, json.dumps(record, indent=1, allow_nan=False) + "\n")

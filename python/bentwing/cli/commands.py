@@ -22,6 +22,7 @@ COMMANDS = {
     "calibrate": "Calibrate a sensor head: motor, IMU and clocks.",
     "plan": "Plan a flight: spin rate, point spacing, coverage.",
     "evaluate": "Measure the errors of a trajectory and a map.",
+    "section": "Draw a plan or section of a map, with its walls.",
     "view": "Show a run: map, path and windows over time.",
     "simulate": "Simulate a recording with truth.",
     "reproduce": "Make a paper's figures and tables again.",

@@ -23,6 +23,8 @@ COMMANDS = {
     "plan": "Plan a flight: spin rate, point spacing, coverage.",
     "evaluate": "Measure the errors of a trajectory and a map.",
     "section": "Draw a plan or section of a map, with its walls.",
+    "terrain": "Find the ground: heights, contours, classes of points.",
+    "volume": "Measure a volume over an area, with its uncertainty.",
     "view": "Show a run: map, path and windows over time.",
     "simulate": "Simulate a recording with truth.",
     "reproduce": "Make a paper's figures and tables again.",

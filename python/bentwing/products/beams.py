@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bentwing.products.cell_sums import cells_at
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -32,11 +34,9 @@ class Passages:
 
     def counted(self, places: Array, weights: NDArray[np.int64] | None = None) -> NDArray[np.int64]:
         """Return how many places (N, 2) m are in each cell (H, W)."""
-        column, row = np.floor((places - self._corner) / self._cell).astype(np.intp).T
-        height, width = self._shape
-        inside = (row >= 0) & (row < height) & (column >= 0) & (column < width)
+        at, inside = cells_at(places, self._corner, self._shape, self._cell)
         kept = None if weights is None else weights[inside]
-        flat = np.bincount(row[inside] * width + column[inside], kept, minlength=height * width)
+        flat = np.bincount(at, kept, minlength=self._shape[0] * self._shape[1])
         return flat.astype(np.int64).reshape(self._shape)
 
     def add(self, sensors: Array, points: Array, heights: tuple[float, float]) -> None:

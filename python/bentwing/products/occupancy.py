@@ -102,10 +102,8 @@ def write_occupancy(
     grey = np.zeros(grid.cells.shape, np.uint8)
     for value, shade in _GREY.items():
         grey[grid.cells == value] = shade
-    height, width = grey.shape
-    write_bytes(
-        path.with_suffix(".pgm"), f"P5\n{width} {height}\n255\n".encode() + grey[::-1].tobytes()
-    )
+    size = f"{grey.shape[1]} {grey.shape[0]}"
+    write_bytes(path.with_suffix(".pgm"), f"P5\n{size}\n255\n".encode() + grey[::-1].tobytes())
     x, y = grid.origin.tolist()
     image = path.with_suffix(".pgm").name
     write_text(path, _YAML.format(image=image, cell=grid.cell, x=x, y=y))
@@ -139,9 +137,11 @@ def _grid_of(
         msg = "an occupancy grid needs a level cut; give --plan or --level instead of --plane"
         raise UsageError(msg)
     places = found.slab.places
-    low, high = np.array([extent(axis) for axis in places.T]).T
+    ends = np.array([extent(axis) for axis in places.T])
+    low, high = ends[:, 0], ends[:, 1]
     corner = np.floor((low - _MARGIN) / cell) * cell
-    width, height = (int(n) for n in np.ceil((high + _MARGIN - corner) / cell))
+    size = np.ceil((high + _MARGIN - corner) / cell)
+    width, height = int(size[0]), int(size[1])
     if width * height > _MOST:
         msg = f"--cell {cell}: the grid would have {width} x {height} cells; give a larger cell"
         raise UsageError(msg)

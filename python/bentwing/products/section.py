@@ -10,14 +10,12 @@ from bentwing.base.errors import UsageError
 from bentwing.base.progress import Progress
 from bentwing.products.cutting import cut_section
 from bentwing.products.finished_map import open_map_of
-from bentwing.products.section_drawing import draw, write_sheet
+from bentwing.products.section_drawing import DRAWINGS, draw, write_sheet
 from bentwing.products.sheet_dxf import require_ezdxf
 
 if TYPE_CHECKING:
     from bentwing.products.cutting import Section
     from bentwing.products.plane import CutPlane
-
-DRAWINGS = (".dxf", ".svg", ".png", ".pdf")
 
 
 def section_of(

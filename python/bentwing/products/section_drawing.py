@@ -22,6 +22,10 @@ if TYPE_CHECKING:
     from bentwing.products.finished_map import FinishedMap
 
 
+DRAWINGS = (".dxf", ".svg", ".png", ".pdf")
+"""Endings of files that a sheet becomes."""
+
+
 def draw(found: Section, source: FinishedMap, scale: int | None) -> Sheet:
     """Draw a section on paper; see `write_section`."""
     ends = np.array([extent(axis) for axis in found.points.T])
@@ -37,12 +41,16 @@ def draw(found: Section, source: FinishedMap, scale: int | None) -> Sheet:
     title, lines = described(found, source)
     legend = [Entry("POINTS", POINT_INK, 0.0, "points")]
     if len(found.lines):
-        legend.append(Entry("WALLS", INK, 0.35, "walls, fitted"))
+        legend.append(Entry("WALLS", INK, 0.35, f"{_noun(found)}, fitted"))
     up = None
     if found.plane.is_level:
         up = "y" if source.epsg is None else "N"
     add_title(sheet, title, lines, legend, up)
     return sheet
+
+
+def _noun(found: Section) -> str:
+    return "walls" if found.plane.is_level else "surfaces"
 
 
 def described(found: Section, source: FinishedMap) -> tuple[str, list[str]]:
@@ -69,7 +77,7 @@ def described(found: Section, source: FinishedMap) -> tuple[str, list[str]]:
     length = np.linalg.norm(found.lines[:, 1] - found.lines[:, 0], axis=1).sum()
     apart = f"{1000 * found.spacing:.0f} mm" if found.spacing < 1 else f"{found.spacing:.1f} m"
     points = f"{found.counts.sum():,} points, {apart} apart on walls (ground sample distance)"
-    walls = f"{len(found.lines)} walls, {length:.1f} m; " if len(found.lines) else ""
+    walls = f"{len(found.lines)} {_noun(found)}, {length:.1f} m; " if len(found.lines) else ""
     return title, [slab, points, walls + place_of(source), made_of(source)]
 
 

@@ -31,17 +31,19 @@ MARGIN = 10.0  # mm between the paper's edge and the frame
 FOOT = 32.0  # mm, height of the title block
 LABELS = (15.0, 6.0)  # mm between the frame and the drawing, at the left and below
 _FINEST_GRID = 18.0  # mm between two lines
+_FROM_EDGE = 2.0  # mm between the frame and a line of the grid
 _SMALL = 2.2  # mm, height of letters
 
 
 @dataclass(frozen=True, slots=True)
 class Stroke:
-    """A line through points (N, 2), mm from the lower left corner."""
+    """A line through points (N, 2), mm from the lower left corner; `level` is its height, m, if it has one."""
 
     layer: Layer
     points: Array
     width: float
     ink: str = INK
+    level: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,6 +175,8 @@ def add_grid(sheet: Sheet) -> None:
         ticks = range(math.ceil(first / interval - 1e-9), math.floor(last / interval + 1e-9) + 1)
         for tick in ticks:
             at = (tick * interval - sheet.corner[axis]) * 1000 / sheet.scale
+            if min(at - start, end - at) < _FROM_EDGE:
+                continue  # its number would lie on the frame
             number = f"{tick * interval:.10g}"
             if axis == 0:
                 sheet.stroke("GRID", [(at, lower), (at, upper)], 0.1, LINE)

@@ -72,7 +72,9 @@ def _draw(ezdxf: Any, model: Any, sheet: Sheet) -> None:  # noqa: ANN401
     for stroke in sheet.strokes:
         places = (stroke.points * metre + sheet.corner).tolist()
         attributes = {"layer": stroke.layer, "lineweight": _line_width(stroke.width)}
-        if len(places) == 2:
+        if stroke.level is not None:
+            model.add_lwpolyline(places, dxfattribs={**attributes, "elevation": stroke.level})
+        elif len(places) == 2:
             model.add_line(*places, dxfattribs=attributes)
         else:
             model.add_lwpolyline(places, dxfattribs=attributes)

@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from bentwing.products.sheet import Letters, Sheet, Stroke
 
 _PIXEL = 0.1  # mm, of the measured points
-_LIGHT, _DARK = np.array([176.0, 190.0, 206.0]), np.array([58.0, 84.0, 130.0])
+_SMALLEST = 2  # pixels of a point
+_LIGHT, _DARK = np.array([140.0, 158.0, 184.0]), np.array([58.0, 84.0, 130.0])
 POINT_INK = "#7f93b4"
 """Of points in a legend."""
 _MANY = 30.0  # points in a cell that are drawn darkest
@@ -59,7 +60,7 @@ def _letters(letters: Letters, height: int) -> str:
 
 def _points(sheet: Sheet, cell: float) -> str:
     left, lower, right, upper = sheet.area
-    image = _image(sheet, max(round(1000 * cell / sheet.scale / _PIXEL), 1))
+    image = _image(sheet, max(round(1000 * cell / sheet.scale / _PIXEL), _SMALLEST))
     data = base64.b64encode(encode_png(image)).decode("ascii")
     place = f'x="{left:g}" y="{sheet.size[1] - upper:g}" width="{right - left:g}" height="{upper - lower:g}"'
     return f'<image {place} href="data:image/png;base64,{data}"/>'

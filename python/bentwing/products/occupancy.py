@@ -99,7 +99,7 @@ def write_occupancy(
     source.require_output(path, (".yaml",))
     source.require_output(path.with_suffix(".pgm"), (".pgm",))
     grid = _grid_of(source, plane, thickness, cell, progress or Progress())
-    grey = np.zeros(grid.cells.shape, np.uint8)
+    grey: NDArray[np.uint8] = np.zeros(grid.cells.shape, np.uint8)
     for value, shade in _GREY.items():
         grey[grid.cells == value] = shade
     size = f"{grey.shape[1]} {grey.shape[0]}"

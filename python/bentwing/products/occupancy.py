@@ -65,8 +65,9 @@ class OccupancyGrid(Value):
         height, width = self.cells.shape
         if not area[0]:
             return (
-                f"{width} x {height} cells, {area[1]:.1f} m² occupied, none known to be free: without "
-                "trajectory and times of the points nobody knows where the beams passed"
+                f"{width} x {height} cells, {area[1]:.1f} m² occupied, none known to be free: the map "
+                "has no trajectory or no times, or its runs were recorded at the same time, so that "
+                "nobody knows where the beams passed"
             )
         return f"{width} x {height} cells, {area[0]:.1f} m² free, {area[1]:.1f} m² occupied"
 

@@ -18,20 +18,21 @@ from bentwing.report.picture import extent
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from numpy.typing import NDArray
+
     from bentwing.products.cutting import Section
     from bentwing.products.finished_map import FinishedMap
 
+    Array = NDArray[np.float64]
 
 DRAWINGS = (".dxf", ".svg", ".png", ".pdf")
 """Endings of files that a sheet becomes."""
+_BESIDE = 0.3  # m around the walls
 
 
 def draw(found: Section, source: FinishedMap, scale: int | None) -> Sheet:
     """Draw a section on paper; see `write_section`."""
-    ends = np.array([extent(axis) for axis in found.points.T])
-    corners = found.lines.reshape(-1, 2)
-    low = np.minimum(ends[:, 0], corners.min(axis=0, initial=np.inf))
-    high = np.maximum(ends[:, 1], corners.max(axis=0, initial=-np.inf))
+    low, high = _frame(found)
     sheet = lay_out(low, high, scale)
     add_grid(sheet)
     inside = sheet.inside(found.points)
@@ -47,6 +48,19 @@ def draw(found: Section, source: FinishedMap, scale: int | None) -> Sheet:
         up = "y" if source.epsg is None else "N"
     add_title(sheet, title, lines, legend, up)
     return sheet
+
+
+def _frame(found: Section) -> tuple[Array, Array]:
+    """Return the corners (2,) m of what is drawn: all walls, and all points but the few far ones."""
+    if not len(found.lines):
+        ends = np.array([extent(axis) for axis in found.points.T])
+        return ends[:, 0], ends[:, 1]
+    corners = found.lines.reshape(-1, 2)
+    usual = np.percentile(found.points, [1, 99], axis=0)
+    return (
+        np.minimum(corners.min(axis=0) - _BESIDE, usual[0]),
+        np.maximum(corners.max(axis=0) + _BESIDE, usual[1]),
+    )
 
 
 def _noun(found: Section) -> str:

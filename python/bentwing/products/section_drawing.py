@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 DRAWINGS = (".dxf", ".svg", ".png", ".pdf")
 """Endings of files that a sheet becomes."""
-_BESIDE = 0.3  # m around the walls
+_BESIDE = 0.05  # m around the walls
 
 
 def draw(found: Section, source: FinishedMap, scale: int | None) -> Sheet:
@@ -90,7 +90,7 @@ def described(found: Section, source: FinishedMap) -> tuple[str, list[str]]:
         )
     length = np.linalg.norm(found.lines[:, 1] - found.lines[:, 0], axis=1).sum()
     apart = f"{1000 * found.spacing:.0f} mm" if found.spacing < 1 else f"{found.spacing:.1f} m"
-    points = f"{found.counts.sum():,} points, {apart} apart on walls (ground sample distance)"
+    points = f"{found.counts.sum():,} points; ground sample distance {apart}"
     walls = f"{len(found.lines)} {_noun(found)}, {length:.1f} m; " if len(found.lines) else ""
     return title, [slab, points, walls + place_of(source), made_of(source)]
 

@@ -73,8 +73,8 @@ def made_of(source: FinishedMap) -> str:
 
 
 def _cut(text: str, room: float, height: float) -> str:
-    """Shorten a text to a width, mm; letters are about half as wide as high."""
-    most = int(room / (0.56 * height))
+    """Shorten a text to a width, mm; letters are about 0.7 times as wide as capitals are high."""
+    most = int(room / (0.72 * height))
     return text if len(text) <= most else text[: most - 3].rstrip() + "..."
 
 

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from bentwing import flight as flight
     from bentwing import map as map  # noqa: A004 - not at run time
     from bentwing import odometry as odometry
+    from bentwing import products as products
     from bentwing import recording as recording
     from bentwing import simulate as simulate
     from bentwing.base.breaks import Break
@@ -103,6 +104,7 @@ PACKAGES = (
     "map",
     "closing",
     "evaluate",
+    "products",
     "flight",
     "simulate",
     "calibrate",

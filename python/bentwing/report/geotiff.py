@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""A picture from above as GeoTIFF: an RGB image that knows where on Earth it lies."""
+"""Pictures and heights from above as GeoTIFF, which knows where on Earth it lies."""
 
 from __future__ import annotations
 
@@ -15,11 +15,13 @@ from bentwing.base.errors import UsageError
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from numpy.typing import NDArray
+
     from bentwing.report.picture import View
 
-_SHORT, _LONG, _DOUBLE = 3, 4, 12  # types of TIFF
-_FORMATS = {_SHORT: "H", _LONG: "I", _DOUBLE: "d"}
-_DEFLATE, _RGB, _HORIZONTAL = 8, 2, 2
+_ASCII, _SHORT, _LONG, _DOUBLE = 2, 3, 4, 12  # types of TIFF
+_FORMATS = {_ASCII: "B", _SHORT: "H", _LONG: "I", _DOUBLE: "d"}
+_DEFLATE, _GREY, _RGB, _HORIZONTAL, _FLOAT = 8, 1, 2, 2, 3
 _STRIP = 64  # rows
 _GEOGRAPHIC = range(4000, 5000)  # EPSG codes of latitude and longitude
 _LARGEST_CODE = 32_767
@@ -45,27 +47,60 @@ def write_geotiff(path: Path, view: View, epsg: int) -> None:
     ----------
     OGC 19-008r4, GeoTIFF 1.1.
     """
-    if not 1024 <= epsg <= _LARGEST_CODE or epsg in _GEOGRAPHIC:
-        msg = f"EPSG:{epsg} is not a projected coordinate system; give that of a UTM zone, such as 32633"
-        raise UsageError(msg)
-    rows, columns, _ = view.image.shape
-    strips = [_compressed(view.image[at : at + _STRIP]) for at in range(0, rows, _STRIP)]
+    _write(path, view.image, (view.pixel, view.left, view.top), epsg)
+
+
+def write_raster(
+    path: Path,
+    values: NDArray[np.float32],
+    place: tuple[float, float, float],
+    epsg: int | None,
+) -> None:
+    """Write values seen from above, as heights of a terrain.
+
+    Parameters
+    ----------
+    path : file to write, atomically
+    values : (H, W), first row on top, NaN where there is none
+    place : m, edge of a pixel, and left and top of the upper left corner
+    epsg : code of the projected coordinate system; None for a frame that has no place on Earth
+
+    Raises
+    ------
+    UsageError
+        If the code is not that of a projected system.
+    """
+    _write(path, values, place, epsg)
+
+
+def _write(
+    path: Path, image: NDArray[np.generic], place: tuple[float, float, float], epsg: int | None
+) -> None:
+    _require_projected(epsg)
+    pixel, left, top = place
+    rows, columns = image.shape[:2]
+    is_picture = image.ndim == 3
+    strips = [_compressed(image[at : at + _STRIP]) for at in range(0, rows, _STRIP)]
     starts = 8 + np.concatenate([[0], np.cumsum([len(strip) for strip in strips])])
-    keys = (1, 1, 1, 3, 1024, 0, 1, 1, 1025, 0, 1, 1, 3072, 0, 1, epsg)  # projected, pixel is area
+    # Projected or of no known system; a pixel is an area.
+    keys: tuple[int, ...] = (1, 1, 0, 1, 1025, 0, 1, 1)
+    if epsg is not None:
+        keys = (1, 1, 1, 3, 1024, 0, 1, 1, 1025, 0, 1, 1, 3072, 0, 1, epsg)
     tags: list[Tag] = [
         (256, _LONG, (columns,)),
         (257, _LONG, (rows,)),
-        (258, _SHORT, (8, 8, 8)),
+        (258, _SHORT, (8, 8, 8) if is_picture else (32,)),
         (259, _SHORT, (_DEFLATE,)),
-        (262, _SHORT, (_RGB,)),
+        (262, _SHORT, (_RGB if is_picture else _GREY,)),
         (273, _LONG, tuple(starts[:-1].tolist())),
-        (277, _SHORT, (3,)),
+        (277, _SHORT, (3 if is_picture else 1,)),
         (278, _LONG, (_STRIP,)),
         (279, _LONG, tuple(len(strip) for strip in strips)),
-        (317, _SHORT, (_HORIZONTAL,)),
-        (33550, _DOUBLE, (view.pixel, view.pixel, 0.0)),
-        (33922, _DOUBLE, (0.0, 0.0, 0.0, view.left, view.top, 0.0)),
+        *([(317, _SHORT, (_HORIZONTAL,))] if is_picture else [(339, _SHORT, (_FLOAT,))]),
+        (33550, _DOUBLE, (pixel, pixel, 0.0)),
+        (33922, _DOUBLE, (0.0, 0.0, 0.0, left, top, 0.0)),
         (34735, _SHORT, keys),
+        *([] if is_picture else [(42113, _ASCII, tuple(b"nan\0"))]),
     ]
     body = b"".join(strips)
     if len(body) % 2:
@@ -74,8 +109,16 @@ def write_geotiff(path: Path, view: View, epsg: int) -> None:
     write_bytes(path, struct.pack("<2sHI", b"II", 42, at) + body + _directory(tags, at))
 
 
-def _compressed(rows: np.ndarray) -> bytes:
-    """Differences along each row compress better than colours."""
+def _require_projected(epsg: int | None) -> None:
+    if epsg is not None and (not 1024 <= epsg <= _LARGEST_CODE or epsg in _GEOGRAPHIC):
+        msg = f"EPSG:{epsg} is not a projected coordinate system; give that of a UTM zone, such as 32633"
+        raise UsageError(msg)
+
+
+def _compressed(rows: NDArray[np.generic]) -> bytes:
+    """Differences along each row compress better than colours; values stay as they are."""
+    if rows.ndim == 2:
+        return zlib.compress(np.ascontiguousarray(rows, "<f4").tobytes(), 6)
     left = np.zeros_like(rows)
     left[:, 1:] = rows[:, :-1]
     return zlib.compress(np.ascontiguousarray(rows - left).tobytes(), 6)

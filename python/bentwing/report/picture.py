@@ -207,13 +207,14 @@ def frame_of(
     """Left, right, bottom and top that hold all but far outliers, with a margin of 2 %."""
     if not len(across):
         return -1.0, 1.0, -1.0, 1.0
-    left, right = _extent(across)
-    bottom, top = _extent(up)
+    left, right = extent(across)
+    bottom, top = extent(up)
     margin = 0.02 * max(right - left, top - bottom, 1.0)
     return left - margin, right + margin, bottom - margin, top + margin
 
 
-def _extent(values: NDArray[np.float64]) -> tuple[float, float]:
+def extent(values: NDArray[np.float64]) -> tuple[float, float]:
+    """Return the ends of values (N,) without far outliers."""
     low, high = np.percentile(thinned(values), [_OUTLIERS, 100 - _OUTLIERS])
     # a far wall has few points, but is not far outside of the rest
     slack = _SLACK * (high - low)

@@ -6,7 +6,7 @@ from __future__ import annotations
 import base64
 import io
 import re
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree as ET
 
 if TYPE_CHECKING:
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     Attributes = Mapping[str, str]
 
 _WIDTH = 1400  # pixels of the picture, at least
+_DOTS = 10.0  # pixels of a mm of paper, 254 of an inch
+_WIDEST = 6000.0  # pixels of paper; large sheets are coarser
 _SMOOTH = 2  # drawn so many times larger and made smaller, for edges without steps
 _HREF = "{http://www.w3.org/1999/xlink}href"
 _STEP = re.compile(r"([MLHVZ])([^MLHVZ]*)")
@@ -39,19 +41,46 @@ def rasterize(drawing: str) -> bytes:
     ValueError
         If it has an element that the drawings of this package do not have.
     """
+    root = ET.fromstring(drawing)
+    return _written(_drawn(root, max(1.0, _WIDTH / _size(root)[0])), "PNG")
+
+
+def rasterize_paper(drawing: str, kind: str) -> bytes:
+    """Return a drawing whose unit is the millimetre as a PNG or PDF that prints at its size.
+
+    Raises
+    ------
+    ValueError
+        If it has an element that the drawings of this package do not have.
+    """
+    root = ET.fromstring(drawing)
+    scale = min(_DOTS, _WIDEST / _size(root)[0])
+    inch = 25.4 * scale
+    details: dict[str, Any] = {"resolution": inch} if kind == "PDF" else {"dpi": (inch, inch)}
+    return _written(_drawn(root, scale), kind, **details)
+
+
+def _size(root: Element) -> tuple[float, float]:
+    width, height = (float(v) for v in root.attrib["viewBox"].split()[2:])
+    return width, height
+
+
+def _drawn(root: Element, pixels: float) -> Pillow.Image:
+    """Draw an SVG element on white, with so many pixels for its unit."""
     from PIL import Image, ImageDraw  # slow to import, so only when it is needed
 
-    root = ET.fromstring(drawing)
-    width, height = (float(v) for v in root.attrib["viewBox"].split()[2:])
-    scale = _SMOOTH * max(1.0, _WIDTH / width)
-    size = round(width * scale), round(height * scale)
-    canvas = _Canvas(Image.new("RGB", size, "white"), scale, _gradients(root))
+    scale = _SMOOTH * pixels
+    width, height = (round(v * scale) for v in _size(root))
+    canvas = _Canvas(Image.new("RGB", (width, height), "white"), scale, _gradients(root))
     canvas.draw = ImageDraw.Draw(canvas.image, "RGBA")
     for element in root:
         canvas.add(element)
-    smaller = canvas.image.resize((size[0] // _SMOOTH, size[1] // _SMOOTH), Image.Resampling.BOX)
+    return canvas.image.resize((width // _SMOOTH, height // _SMOOTH), Image.Resampling.BOX)
+
+
+def _written(picture: Pillow.Image, kind: str, **details: Any) -> bytes:  # noqa: ANN401 - Pillow's
     written = io.BytesIO()
-    smaller.save(written, "PNG")
+    picture.save(written, kind, **details)
     return written.getvalue()
 
 

@@ -119,8 +119,8 @@ def open_svg(width: int, height: int, name: str) -> str:
     )
 
 
-def standalone(drawing: str) -> str:
-    """Make a drawing a file of its own: with its size, a font, and paper below."""
+def standalone(drawing: str, unit: str = "") -> str:
+    """Make a drawing a file of its own: with its size in a unit, a font, and paper below."""
     size = _VIEW_BOX.search(drawing)
     if size is None:
         msg = "drawing: expected an SVG with a view box"
@@ -128,18 +128,18 @@ def standalone(drawing: str) -> str:
     width, height = size.groups()
     opening, rest = drawing.split(">", 1)
     return (
-        f'{opening} width="{width}" height="{height}"><style>text{{font-family:system-ui,'
+        f'{opening} width="{width}{unit}" height="{height}{unit}"><style>text{{font-family:system-ui,'
         'sans-serif}</style><rect width="100%" height="100%" fill="#fff"/>'
         f"{rest}\n"
     )
 
 
 def text(  # noqa: PLR0917 - position, content and style
-    x: float, y: float, content: str, anchor: str, ink: str = FAINT, size: int = 12
+    x: float, y: float, content: str, anchor: str, ink: str = FAINT, size: float = 12
 ) -> str:
     """Draw a text; `anchor` is start, middle or end."""
     return (
-        f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" fill="{ink}" font-size="{size}">'
+        f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" fill="{ink}" font-size="{size:g}">'
         f"{escape(content)}</text>"
     )
 

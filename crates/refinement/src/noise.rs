@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! How noisy ranges are, as the smooth surfaces of a map show it.
+
+/// Steps of the range, half an octave each, the first one up to 0.25 m.
+pub(crate) const N_STEPS: usize = 24;
+const FIRST: f32 = 0.25;
+/// Of the sheets of a range the noise is the residual of those that are smoother than most: what is more
+/// is the shape of a surface.
+const SMOOTH: f64 = 0.3;
+/// Fewer sheets tell no noise of their range.
+const FEWEST: usize = 25;
+
+/// Standard deviation of a range by the range.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Noise([f64; N_STEPS]);
+
+/// Step of a range.
+#[inline]
+pub(crate) fn step_of(range: f32) -> usize {
+    let octaves = (range / FIRST).max(1.0).log2();
+    ((2.0 * octaves) as usize).min(N_STEPS - 1)
+}
+
+impl Noise {
+    /// From the ranges (m) of smooth sheets and the standard deviations of their residuals along the
+    /// beams; none without sheets.
+    pub(crate) fn of(found: &[(f32, f64)]) -> Option<Self> {
+        let mut steps: [Vec<f64>; N_STEPS] = Default::default();
+        for &(range, sigma) in found {
+            steps[step_of(range)].push(sigma);
+        }
+        let mut all: Vec<f64> = found.iter().map(|f| f.1).collect();
+        let usual = quantile(&mut all)?;
+        let own = steps.map(|mut s| if s.len() < FEWEST { None } else { quantile(&mut s) });
+        let known: Vec<usize> = (0..N_STEPS).filter(|&k| own[k].is_some()).collect();
+        let nearest = |k: usize| known.iter().copied().min_by_key(|&other| other.abs_diff(k));
+        Some(Self(std::array::from_fn(|k| nearest(k).and_then(|n| own[n]).unwrap_or(usual))))
+    }
+
+    /// Of a range, m.
+    #[inline]
+    pub fn sigma(&self, range: f32) -> f64 {
+        self.0[step_of(range)]
+    }
+
+    /// By the steps of half an octave, m.
+    pub fn sigmas(&self) -> &[f64] {
+        &self.0
+    }
+}
+
+fn quantile(values: &mut [f64]) -> Option<f64> {
+    let at = ((values.len() as f64 * SMOOTH) as usize).min(values.len().checked_sub(1)?);
+    Some(*values.select_nth_unstable_by(at, f64::total_cmp).1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_range_has_the_noise_of_its_sheets_and_others_that_of_the_nearest() {
+        let near = (0..100).map(|i| (2.0, 0.01 + 1e-5 * f64::from(i)));
+        let far = (0..100).map(|i| (16.0, 0.03 + 1e-5 * f64::from(i)));
+        let found: Vec<(f32, f64)> = near.chain(far).collect();
+        let noise = Noise::of(&found).unwrap();
+        assert!((noise.sigma(2.0) - 0.0103).abs() < 1e-9);
+        assert!((noise.sigma(16.0) - 0.0303).abs() < 1e-9);
+        assert_eq!(noise.sigma(0.1), noise.sigma(2.0));
+        assert_eq!(noise.sigma(100.0), noise.sigma(16.0));
+    }
+
+    #[test]
+    fn without_sheets_there_is_no_noise() {
+        assert!(Noise::of(&[]).is_none());
+    }
+}

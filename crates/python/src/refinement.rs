@@ -30,8 +30,8 @@ pub(crate) struct SurfaceSample(Option<Sample>);
 #[pymethods]
 impl SurfaceSample {
     #[new]
-    #[pyo3(signature = (*, edge, n_levels, enough, fewest_passes, pass_length))]
-    fn new(edge: f64, n_levels: u32, enough: usize, fewest_passes: f64, pass_length: f64) -> PyResult<Self> {
+    #[pyo3(signature = (*, edge, n_levels, enough, fewest_passes, most_noise, pass_length))]
+    fn new(edge: f64, n_levels: u32, enough: usize, fewest_passes: f64, most_noise: f64, pass_length: f64) -> PyResult<Self> {
         for (name, value) in [("edge", edge), ("pass_length", pass_length)] {
             if finite_number(name, value)? <= 0.0 {
                 let message = format!("{name}: expected a positive number, got {value}");
@@ -43,6 +43,7 @@ impl SurfaceSample {
             n_levels: n_levels.clamp(1, 8),
             enough: enough.max(1),
             fewest_passes: finite_number("fewest_passes", fewest_passes)?,
+            most_noise: finite_number("most_noise", most_noise)?,
             pass: pass_length,
         }))))
     }

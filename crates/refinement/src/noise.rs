@@ -9,6 +9,10 @@ const FIRST: f32 = 0.25;
 const SMOOTH: f64 = 0.3;
 /// Fewer sheets tell no noise of their range.
 const FEWEST: usize = 25;
+/// By how much the noise grows from a step to the next at most, and by how much it may shrink: where all
+/// that is near are leaves, only what is farther tells the noise.
+const GROWS: f64 = 1.4;
+const SHRINKS: f64 = 1.1;
 
 /// Standard deviation of a range by the range.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,18 +27,22 @@ pub(crate) fn step_of(range: f32) -> usize {
 
 impl Noise {
     /// From the ranges (m) of smooth sheets and the standard deviations of their residuals along the
-    /// beams; none without sheets.
-    pub(crate) fn of(found: &[(f32, f64)]) -> Option<Self> {
+    /// beams, none above `most`; none without sheets.
+    pub(crate) fn of(found: &[(f32, f64)], most: f64) -> Option<Self> {
         let mut steps: [Vec<f64>; N_STEPS] = Default::default();
         for &(range, sigma) in found {
             steps[step_of(range)].push(sigma);
         }
         let mut all: Vec<f64> = found.iter().map(|f| f.1).collect();
-        let usual = quantile(&mut all)?;
+        let usual = quantile(&mut all)?.min(most);
         let own = steps.map(|mut s| if s.len() < FEWEST { None } else { quantile(&mut s) });
-        let known: Vec<usize> = (0..N_STEPS).filter(|&k| own[k].is_some()).collect();
-        let nearest = |k: usize| known.iter().copied().min_by_key(|&other| other.abs_diff(k));
-        Some(Self(std::array::from_fn(|k| nearest(k).and_then(|n| own[n]).unwrap_or(usual))))
+        let known: Vec<(usize, f64)> = (0..N_STEPS).filter_map(|k| Some((k, own[k]?))).collect();
+        let of_step = |k: usize| {
+            let nearest = known.iter().min_by_key(|(other, _)| other.abs_diff(k));
+            let bounds = known.iter().map(|&(other, sigma)| sigma * growth(other, k));
+            bounds.fold(nearest.map_or(usual, |n| n.1).min(most), f64::min)
+        };
+        Some(Self(std::array::from_fn(of_step)))
     }
 
     /// Of a range, m.
@@ -47,6 +55,12 @@ impl Noise {
     pub fn sigmas(&self) -> &[f64] {
         &self.0
     }
+}
+
+/// By how much the noise of one step may exceed that of another.
+fn growth(from: usize, to: usize) -> f64 {
+    let apart = from.abs_diff(to) as i32;
+    if to > from { GROWS.powi(apart) } else { SHRINKS.powi(apart) }
 }
 
 fn quantile(values: &mut [f64]) -> Option<f64> {
@@ -63,7 +77,7 @@ mod tests {
         let near = (0..100).map(|i| (2.0, 0.01 + 1e-5 * f64::from(i)));
         let far = (0..100).map(|i| (16.0, 0.03 + 1e-5 * f64::from(i)));
         let found: Vec<(f32, f64)> = near.chain(far).collect();
-        let noise = Noise::of(&found).unwrap();
+        let noise = Noise::of(&found, 0.05).unwrap();
         assert!((noise.sigma(2.0) - 0.0103).abs() < 1e-9);
         assert!((noise.sigma(16.0) - 0.0303).abs() < 1e-9);
         assert_eq!(noise.sigma(0.1), noise.sigma(2.0));
@@ -72,6 +86,16 @@ mod tests {
 
     #[test]
     fn without_sheets_there_is_no_noise() {
-        assert!(Noise::of(&[]).is_none());
+        assert!(Noise::of(&[], 0.05).is_none());
+    }
+
+    #[test]
+    fn leaves_that_are_near_do_not_make_ranges_noisy() {
+        let leaves = (0..100).map(|_| (2.0, 0.07));
+        let walls = (0..100).map(|_| (4.0, 0.01));
+        let found: Vec<(f32, f64)> = leaves.chain(walls).collect();
+        let noise = Noise::of(&found, 0.05).unwrap();
+        assert!(noise.sigma(2.0) < 0.0125);
+        assert!(Noise::of(&found, 0.005).unwrap().sigma(4.0) <= 0.005);
     }
 }

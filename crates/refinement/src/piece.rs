@@ -54,13 +54,16 @@ impl Piece {
     #[inline]
     pub(crate) fn says(&self, at: &[f32; 3], beam: &[f32; 3], sigma: f32) -> Option<Hypothesis> {
         let d = [0, 1, 2].map(|a| at[a] - self.middle[a]);
-        let share = 1.0 - dot(&d, &d) * self.per_radius * self.per_radius;
         let [x, y, z, offset] = self.half;
-        if share <= 0.0 || dot(&[x, y, z], &d) < offset {
+        if dot(&[x, y, z], &d) < offset {
             return None;
         }
         let [u, v, height] = self.axes.map(|row| dot(&row, &d));
         let (u, v, h) = (u * self.per_radius, v * self.per_radius, &self.heights);
+        let share = 1.0 - u * u - v * v;
+        if share <= 0.0 {
+            return None;
+        }
         let off = height - (h[0] + u * (h[1] + h[3] * u + h[4] * v) + v * (h[2] + h[5] * v));
         let du = (h[1] + 2.0 * h[3] * u + h[4] * v) * self.per_radius;
         let dv = (h[2] + h[4] * u + 2.0 * h[5] * v) * self.per_radius;

@@ -16,6 +16,8 @@ pub struct Settings {
     pub enough: usize,
     /// Fewer effective points of a sheet, counted by passes, move nothing.
     pub fewest_passes: f64,
+    /// No noise of a range is larger, m.
+    pub most_noise: f64,
     /// What is measured within this time shares the error of the trajectory, s.
     pub pass: f64,
 }

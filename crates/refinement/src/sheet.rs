@@ -132,14 +132,19 @@ impl Sheet {
         let local = |s: &Spot| {
             let (at, beam) = (axes * s.at, axes * s.beam);
             let across = beam[2].abs().max(GRAZING) * s.sigma;
+            let (u, v) = (at[0] * per_metre, at[1] * per_metre);
+            // By the distance along the surface alone: by that across it, what the noise brings nearer to
+            // the middle would count more, and draw the surface there.
+            let share = (1.0 - u * u - v * v).max(0.0);
+            let weight = share * share;
             Local {
-                u: at[0] * per_metre,
-                v: at[1] * per_metre,
+                u,
+                v,
                 height: at[2],
                 beam,
                 sigma: s.sigma,
-                weight: s.weight,
-                inverse: s.weight / (across * across),
+                weight,
+                inverse: weight / (across * across),
             }
         };
         spots.iter().map(local).collect()
@@ -179,7 +184,8 @@ impl Sheet {
         let (mut sum, mut squares, mut weighted, mut variances) = (0.0, 0.0, 0.0, 0.0);
         let mut passes = [(0.0, 0.0); N_PASSES];
         for (i, l) in locals.iter().enumerate() {
-            let (r, v) = (residuals[i], l.weight / l.inverse);
+            let across = l.beam[2].abs().max(GRAZING) * l.sigma;
+            let (r, v) = (residuals[i], across * across);
             self.cost += l.weight * (r * r).min(REJECTED * REJECTED);
             self.weight += l.weight;
             let share = weights[i] * v;

@@ -115,7 +115,7 @@ fn noise_of(sorted: &Sorted) -> Option<Noise> {
             .collect();
         found.extend(of_level.into_iter().flatten());
     }
-    Noise::of(&found)
+    Noise::of(&found, sorted.settings.most_noise)
 }
 
 /// Range of a cell's points and the standard deviation of their residuals along the beams.

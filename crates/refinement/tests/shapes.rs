@@ -12,6 +12,7 @@ const SETTINGS: Settings = Settings {
     n_levels: 4,
     enough: 80,
     fewest_passes: 5.0,
+    most_noise: 0.03,
     pass: 0.5,
 };
 const NOISE: f64 = 0.01;
@@ -234,8 +235,8 @@ fn cylinders_keep_their_radius() {
             let inner = points.iter().filter(|p| p[2].abs() < 0.5);
             statistics(inner.map(|p| p[0].hypot(p[1]) - radius).collect::<Vec<_>>().into_iter())
         };
-        let ((raw, before), (mean, after)) = (radii(&map.points), radii(&map.moved()));
-        assert!((mean - raw).abs() < 1e-3, "{radius}: {mean} {raw}");
+        let ((_, before), (mean, after)) = (radii(&map.points), radii(&map.moved()));
+        assert!(mean.abs() < 1e-3, "{radius}: {mean}");
         assert!(after < 0.75 * before, "{radius}: {after} of {before}");
     }
 }

@@ -2,7 +2,7 @@
 //! `_core.MapSurvey` and `_core.MapCells`: what the points of a map say about each other.
 
 use bentwing_cells::{Cells, Settings, Survey};
-use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
+use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 

@@ -16,7 +16,11 @@ pub(crate) struct RangeNoise(Noise);
 #[pymethods]
 impl RangeNoise {
     /// Standard deviations of ranges, m.
-    fn sigmas<'py>(&self, py: Python<'py>, ranges: PyReadonlyArray1<'_, f32>) -> PyResult<Bound<'py, PyArray1<f32>>> {
+    fn sigmas<'py>(
+        &self,
+        py: Python<'py>,
+        ranges: PyReadonlyArray1<'_, f32>,
+    ) -> PyResult<Bound<'py, PyArray1<f32>>> {
         let ranges = same("ranges", &ranges, ranges.len())?;
         let sigmas: Vec<f32> = ranges.iter().map(|&r| self.0.sigma(r) as f32).collect();
         Ok(sigmas.into_pyarray(py))
@@ -31,7 +35,14 @@ pub(crate) struct SurfaceSample(Option<Sample>);
 impl SurfaceSample {
     #[new]
     #[pyo3(signature = (*, edge, n_levels, enough, fewest_passes, most_noise, pass_length))]
-    fn new(edge: f64, n_levels: u32, enough: usize, fewest_passes: f64, most_noise: f64, pass_length: f64) -> PyResult<Self> {
+    fn new(
+        edge: f64,
+        n_levels: u32,
+        enough: usize,
+        fewest_passes: f64,
+        most_noise: f64,
+        pass_length: f64,
+    ) -> PyResult<Self> {
         for (name, value) in [("edge", edge), ("pass_length", pass_length)] {
             if finite_number(name, value)? <= 0.0 {
                 let message = format!("{name}: expected a positive number, got {value}");
@@ -71,7 +82,12 @@ impl SurfaceSample {
     /// The surfaces, for the noise of the ranges or else that which smooth surfaces show; None without
     /// such; ends the sample.
     #[pyo3(signature = (*, noise=None, threads=0))]
-    fn fit(&mut self, py: Python<'_>, noise: Option<&RangeNoise>, threads: usize) -> PyResult<Option<Surfaces>> {
+    fn fit(
+        &mut self,
+        py: Python<'_>,
+        noise: Option<&RangeNoise>,
+        threads: usize,
+    ) -> PyResult<Option<Surfaces>> {
         let sample = self.0.take().ok_or_else(used)?;
         let known = noise.map(|n| n.0.clone());
         in_pool(py, threads, || sample.fit(known).map(Surfaces))
@@ -102,7 +118,10 @@ impl Surfaces {
         threads: usize,
     ) -> PyResult<(Bound<'py, PyArray1<f32>>, Bound<'py, PyArray1<f32>>)> {
         let points = finite_rows("points", &points)?;
-        let (beams, ranges) = (rows("beams", &beams)?, same("ranges", &ranges, points.len())?);
+        let (beams, ranges) = (
+            rows("beams", &beams)?,
+            same("ranges", &ranges, points.len())?,
+        );
         require_rows("beams", beams.len(), points.len())?;
         let found = in_pool(py, threads, || self.0.refine(points, beams, ranges))?;
         Ok((found.moves.into_pyarray(py), found.sigmas.into_pyarray(py)))

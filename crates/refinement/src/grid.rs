@@ -92,10 +92,21 @@ impl Level {
         })
     }
 
-    /// Numbers of the eight cells whose middles are around a point.
-    pub(crate) fn nearest(&self, p: &[f64; 3]) -> impl Iterator<Item = u32> + '_ {
-        let low = p.map(|c| (c / self.edge - 0.5).floor() as i64);
-        (0..8_i64).filter_map(move |k| self.number([low[0] + (k >> 2), low[1] + (k >> 1 & 1), low[2] + (k & 1)]))
+    /// Numbers of the cells at the three sides of a point's cell that are nearest to it.
+    #[inline]
+    pub(crate) fn beside(&self, p: &[f64; 3]) -> [Option<u32>; 3] {
+        let scaled = p.map(|c| c / self.edge);
+        let cell = scaled.map(|c| c.floor() as i64);
+        let beside = |axis: usize| {
+            let mut other = cell;
+            other[axis] += if scaled[axis] - cell[axis] as f64 > 0.5 {
+                1
+            } else {
+                -1
+            };
+            self.number(other)
+        };
+        [beside(0), beside(1), beside(2)]
     }
 }
 
@@ -117,18 +128,33 @@ mod tests {
     #[test]
     fn each_point_is_in_the_cell_that_its_coordinates_say() {
         let points: Vec<[f64; 3]> = (0..500)
-            .map(|i| [f64::from(i % 7) * 0.3 - 1.0, f64::from(i % 11) * 0.21 - 1.1, f64::from(i) * 0.01 - 2.0])
+            .map(|i| {
+                [
+                    f64::from(i % 7) * 0.3 - 1.0,
+                    f64::from(i % 11) * 0.21 - 1.1,
+                    f64::from(i) * 0.01 - 2.0,
+                ]
+            })
             .collect();
-        let mut codes: Vec<u64> = points.iter().map(|p| code_of(p.map(|c| (c / 0.1).floor() as i64))).collect();
+        let mut codes: Vec<u64> = points
+            .iter()
+            .map(|p| code_of(p.map(|c| (c / 0.1).floor() as i64)))
+            .collect();
         codes.sort_unstable();
         for level in 0..3 {
             let cells = Level::of(&codes, 0.1, level);
-            let counted: usize = (0..cells.n_cells()).map(|c| cells.points(c as u32).len()).sum();
+            let counted: usize = (0..cells.n_cells())
+                .map(|c| cells.points(c as u32).len())
+                .sum();
             assert_eq!(counted, points.len());
             for p in &points {
                 let number = cells.number(cells.cell_of(p)).unwrap();
                 let of_point = code_of(p.map(|c| (c / 0.1).floor() as i64)) >> (3 * level);
-                assert!(cells.points(number).all(|i| codes[i] >> (3 * level) == of_point));
+                assert!(
+                    cells
+                        .points(number)
+                        .all(|i| codes[i] >> (3 * level) == of_point)
+                );
             }
         }
     }

@@ -35,7 +35,13 @@ impl Noise {
         }
         let mut all: Vec<f64> = found.iter().map(|f| f.1).collect();
         let usual = quantile(&mut all)?.min(most);
-        let own = steps.map(|mut s| if s.len() < FEWEST { None } else { quantile(&mut s) });
+        let own = steps.map(|mut s| {
+            if s.len() < FEWEST {
+                None
+            } else {
+                quantile(&mut s)
+            }
+        });
         let known: Vec<(usize, f64)> = (0..N_STEPS).filter_map(|k| Some((k, own[k]?))).collect();
         let of_step = |k: usize| {
             let nearest = known.iter().min_by_key(|(other, _)| other.abs_diff(k));
@@ -60,7 +66,11 @@ impl Noise {
 /// By how much the noise of one step may exceed that of another.
 fn growth(from: usize, to: usize) -> f64 {
     let apart = from.abs_diff(to) as i32;
-    if to > from { GROWS.powi(apart) } else { SHRINKS.powi(apart) }
+    if to > from {
+        GROWS.powi(apart)
+    } else {
+        SHRINKS.powi(apart)
+    }
 }
 
 fn quantile(values: &mut [f64]) -> Option<f64> {

@@ -37,7 +37,10 @@ impl Surfaces {
         let at = [0, 1, 2].map(|a| (point[a] - self.origin[a]) as f32);
         let sigma = self.noise.sigma(range) as f32;
         let layers = self.layers.iter();
-        match layers.filter_map(|layer| of_layer(layer, &at, beam, sigma)).next() {
+        match layers
+            .filter_map(|layer| of_layer(layer, &at, beam, sigma))
+            .next()
+        {
             Some((shift, variance)) if shift.abs() <= FARTHEST * sigma => (shift, variance.sqrt()),
             _ => (0.0, sigma),
         }
@@ -51,13 +54,16 @@ fn of_layer(layer: &Layer, at: &[f32; 3], beam: &[f32; 3], sigma: f32) -> Option
     if layer.of_cell(own).is_empty() {
         return None;
     }
+    let cells = layer.level.beside(&p).into_iter().flatten();
+    let pieces = layer
+        .of_cell(own)
+        .iter()
+        .chain(cells.flat_map(|number| layer.of_cell(number)));
     let (mut sum, mut shift, mut squares) = (0.0, 0.0, 0.0);
-    for number in layer.level.nearest(&p) {
-        for h in layer.of_cell(number).iter().filter_map(|piece| piece.says(at, beam, sigma)) {
-            sum += h.weight;
-            shift += h.weight * h.shift;
-            squares += h.weight * (h.variance + h.shift * h.shift);
-        }
+    for h in pieces.filter_map(|piece| piece.says(at, beam, sigma)) {
+        sum += h.weight;
+        shift += h.weight * h.shift;
+        squares += h.weight * (h.variance + h.shift * h.shift);
     }
     if sum <= 0.0 {
         return None;

@@ -77,11 +77,21 @@ impl Sample {
     pub(crate) fn sorted(self) -> Sorted {
         let edge = self.settings.edge;
         let code = |s: &Shot| code_of(s.at.map(|c| (f64::from(c) / edge).floor() as i64));
-        let mut order: Vec<(u64, u32)> = self.shots.par_iter().enumerate().map(|(i, s)| (code(s), i as u32)).collect();
+        let mut order: Vec<(u64, u32)> = self
+            .shots
+            .par_iter()
+            .enumerate()
+            .map(|(i, s)| (code(s), i as u32))
+            .collect();
         order.par_sort_unstable();
-        let shots = order.par_iter().map(|&(_, i)| self.shots[i as usize]).collect();
+        let shots = order
+            .par_iter()
+            .map(|&(_, i)| self.shots[i as usize])
+            .collect();
         let codes: Vec<u64> = order.into_iter().map(|(code, _)| code).collect();
-        let levels = (0..self.settings.n_levels).map(|l| Level::of(&codes, edge, l)).collect();
+        let levels = (0..self.settings.n_levels)
+            .map(|l| Level::of(&codes, edge, l))
+            .collect();
         Sorted {
             settings: self.settings,
             origin: self.origin.unwrap_or_default(),

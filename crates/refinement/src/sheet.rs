@@ -2,7 +2,7 @@
 //! One smooth piece of surface through noisy points: a plane, or a quadric where it curves.
 
 use bentwing_trajectory::so3;
-use bentwing_voxels::{MIN_WIDTH, sym3};
+use bentwing_voxels::{MIN_WIDTH, Moments};
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 
 /// Passes are told apart by so many bins.
@@ -32,8 +32,6 @@ pub(crate) struct Spot {
     pub beam: Vector3<f64>,
     /// Of the range, m.
     pub sigma: f64,
-    /// By its distance from the middle, 0 to 1.
-    pub weight: f64,
     pub pass: u8,
 }
 
@@ -158,7 +156,11 @@ impl Sheet {
     }
 
     fn face(&mut self) {
-        let up = Vector3::new(-self.heights[1] / self.radius, -self.heights[2] / self.radius, 1.0);
+        let up = Vector3::new(
+            -self.heights[1] / self.radius,
+            -self.heights[2] / self.radius,
+            1.0,
+        );
         self.normal = (self.axes.transpose() * up).normalize();
     }
 
@@ -180,7 +182,14 @@ impl Sheet {
         Some(())
     }
 
-    fn describe(&mut self, spots: &[Spot], locals: &[Local], weights: &[f64], residuals: &[f64], normal: f64) {
+    fn describe(
+        &mut self,
+        spots: &[Spot],
+        locals: &[Local],
+        weights: &[f64],
+        residuals: &[f64],
+        normal: f64,
+    ) {
         let (mut sum, mut squares, mut weighted, mut variances) = (0.0, 0.0, 0.0, 0.0);
         let mut passes = [(0.0, 0.0); N_PASSES];
         for (i, l) in locals.iter().enumerate() {
@@ -224,7 +233,8 @@ impl Sheet {
     /// Residual over its standard deviation.
     fn normalized(&self, l: &Local) -> f64 {
         let h = &self.heights;
-        let height = l.height - (h[0] + l.u * (h[1] + h[3] * l.u + h[4] * l.v) + l.v * (h[2] + h[5] * l.v));
+        let height =
+            l.height - (h[0] + l.u * (h[1] + h[3] * l.u + h[4] * l.v) + l.v * (h[2] + h[5] * l.v));
         let du = (h[1] + 2.0 * h[3] * l.u + h[4] * l.v) / self.radius;
         let dv = (h[2] + h[4] * l.u + 2.0 * h[5] * l.v) / self.radius;
         let norm = (1.0 + du * du + dv * dv).sqrt();
@@ -275,19 +285,21 @@ fn frame(normal: &Vector3<f64>) -> Matrix3<f64> {
 
 /// The normal of a plane through spots, in whose direction they spread least; it faces the lidar.
 pub(crate) fn normal_of(spots: &[Spot]) -> Option<Vector3<f64>> {
-    let sum: f64 = spots.iter().map(|s| s.weight).sum();
-    if sum <= 0.0 {
+    let mut sums = Moments::default();
+    let mut beams = Vector3::zeros();
+    for s in spots {
+        sums.add_point(s.at.into());
+        beams += s.beam;
+    }
+    if sums.n() == 0 {
         return None;
     }
-    let mean = spots.iter().fold(Vector3::zeros(), |m, s| m + s.at * s.weight) / sum;
-    let mut covariance = Matrix3::zeros();
-    for s in spots {
-        let d = s.at - mean;
-        covariance += d * d.transpose() * s.weight;
-    }
-    let normal = sym3::eigen(&(covariance / sum)).normal;
-    let towards: f64 = spots.iter().map(|s| s.weight * s.beam.dot(&normal)).sum();
-    Some(if towards > 0.0 { -normal } else { normal })
+    let normal = sums.eigen().normal;
+    Some(if beams.dot(&normal) > 0.0 {
+        -normal
+    } else {
+        normal
+    })
 }
 
 /// Normal equations of heights.
@@ -306,7 +318,21 @@ impl Sums {
             let (p, q, h) = (l.u, l.v, l.height);
             let (pp, pq, qq) = (p * p, p * q, q * q);
             let terms = [
-                1.0, p, q, pp, pq, qq, pp * p, pp * q, p * qq, qq * q, pp * pp, pp * pq, pp * qq, pq * qq, qq * qq,
+                1.0,
+                p,
+                q,
+                pp,
+                pq,
+                qq,
+                pp * p,
+                pp * q,
+                p * qq,
+                qq * q,
+                pp * pp,
+                pp * pq,
+                pp * qq,
+                pq * qq,
+                qq * qq,
             ];
             for (sum, t) in a.iter_mut().zip(terms) {
                 *sum += w * t;
@@ -343,7 +369,11 @@ impl Sums {
         }
         let m = &self.matrix;
         let (mu, mv) = (m[(0, 1)] / w, m[(0, 2)] / w);
-        let (uu, uv, vv) = (m[(1, 1)] / w - mu * mu, m[(1, 2)] / w - mu * mv, m[(2, 2)] / w - mv * mv);
+        let (uu, uv, vv) = (
+            m[(1, 1)] / w - mu * mu,
+            m[(1, 2)] / w - mu * mv,
+            m[(2, 2)] / w - mv * mv,
+        );
         let half = 0.5 * (uu + vv);
         let smaller = half - (0.25 * (uu - vv) * (uu - vv) + uv * uv).sqrt();
         smaller > (2.0 * MIN_WIDTH) * (2.0 * MIN_WIDTH)

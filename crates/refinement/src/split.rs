@@ -7,8 +7,8 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::sheet::{Sheet, Spot, normal_of};
 
-const N_DIRECTIONS: usize = 8;
-const N_BINS: usize = 12;
+const N_DIRECTIONS: usize = 6;
+const N_BINS: usize = 10;
 /// Each side has at least this share of the weights, and so many points.
 const SMALLEST: f64 = 0.12;
 const FEWEST: usize = 8;
@@ -44,7 +44,12 @@ impl Half {
 pub(crate) type Pair = [(Sheet, Half); 2];
 
 /// The two sheets that explain the spots better than `one` does, if any do.
-pub(crate) fn split(spots: &[Spot], radius: f64, normal: &Vector3<f64>, one: Option<&Sheet>) -> Option<Pair> {
+pub(crate) fn split(
+    spots: &[Spot],
+    radius: f64,
+    normal: &Vector3<f64>,
+    one: Option<&Sheet>,
+) -> Option<Pair> {
     let coarse = best_line(spots, normal)?;
     let pair = fit_halves(spots, radius, coarse)?;
     let better = follow(spots, &pair, normal).and_then(|line| fit_halves(spots, radius, line));
@@ -52,7 +57,7 @@ pub(crate) fn split(spots: &[Spot], radius: f64, normal: &Vector3<f64>, one: Opt
         Some(found) if cost(&found) < cost(&pair) => found,
         _ => pair,
     };
-    is_better(spots, &pair, one).then_some(pair)
+    is_better(&pair, one).then_some(pair)
 }
 
 fn cost(pair: &Pair) -> f64 {
@@ -60,9 +65,9 @@ fn cost(pair: &Pair) -> f64 {
 }
 
 /// Bayesian information criterion.
-fn is_better(spots: &[Spot], pair: &Pair, one: Option<&Sheet>) -> bool {
+fn is_better(pair: &Pair, one: Option<&Sheet>) -> bool {
     let Some(one) = one else { return true };
-    let n: f64 = spots.iter().map(|s| s.weight).sum();
+    let n = one.weight;
     let parameters = pair[0].0.n_parameters + pair[1].0.n_parameters + LINE;
     let left = (cost(pair) / n.max(1.0)).max(1.0);
     let price = (parameters as f64 - one.n_parameters as f64) * n.max(1.0).ln();
@@ -81,7 +86,11 @@ fn fit_halves(spots: &[Spot], radius: f64, half: Half) -> Option<Pair> {
 /// The line that leaves two planes with the least squares.
 fn best_line(spots: &[Spot], normal: &Vector3<f64>) -> Option<Half> {
     let [u, v] = so3::orthogonal_pair(normal);
-    let reach = spots.iter().map(|s| s.at.norm()).fold(0.0, f64::max).max(1e-6);
+    let reach = spots
+        .iter()
+        .map(|s| s.at.norm())
+        .fold(0.0, f64::max)
+        .max(1e-6);
     let mut best: Option<(f64, Half)> = None;
     for k in 0..N_DIRECTIONS {
         let (sin, cos) = (std::f64::consts::PI * k as f64 / N_DIRECTIONS as f64).sin_cos();
@@ -122,7 +131,7 @@ fn follow(spots: &[Spot], pair: &Pair, normal: &Vector3<f64>) -> Option<Half> {
         let direction = (pair[0].1.direction + across * turn).normalize();
         let mut order: Vec<(f64, f64)> = spots
             .iter()
-            .map(|s| (direction.dot(&s.at), s.weight * (a.cost_of(s) - b.cost_of(s))))
+            .map(|s| (direction.dot(&s.at), a.cost_of(s) - b.cost_of(s)))
             .collect();
         order.sort_unstable_by(|x, y| x.0.total_cmp(&y.0));
         // Beginning with all spots in the half of the first sheet, those below the line leave it.
@@ -162,7 +171,7 @@ struct Sums {
 
 impl Sums {
     fn add(&mut self, s: &Spot) {
-        let w = s.weight / (s.sigma * s.sigma);
+        let w = 1.0 / (s.sigma * s.sigma);
         self.w += w;
         self.first += s.at * w;
         self.second += s.at * s.at.transpose() * w;

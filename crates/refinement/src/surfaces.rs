@@ -6,15 +6,15 @@ use rayon::prelude::*;
 
 use crate::grid::Level;
 use crate::noise::Noise;
-use crate::sample::{Sample, Sorted};
 use crate::piece::Piece;
+use crate::sample::{Sample, Sorted};
 use crate::sheet::{N_PASSES, Sheet, Spot, normal_of};
 use crate::split::{Half, split};
 
 /// Points around a middle are used up to so many edges away, with less and less weight.
 const REACH: f64 = 1.5;
 /// More points of a cell's surroundings are thinned.
-const MOST_SPOTS: usize = 300;
+const MOST_SPOTS: usize = 200;
 /// Fewer points of one side are no sheet.
 const FEWEST_SPOTS: usize = 8;
 /// One of so many cells is looked at to learn the noise.
@@ -72,7 +72,9 @@ impl Sample {
             let found: Vec<Vec<Piece>> = cells
                 .par_iter()
                 .with_min_len(CHUNK)
-                .map_init(Vec::new, |spots, &c| pieces_of(&sorted, level, c, &noise, spots))
+                .map_init(Vec::new, |spots, &c| {
+                    pieces_of(&sorted, level, c, &noise, spots)
+                })
                 .collect();
             let mut layer = Layer {
                 level: Level::default(),
@@ -119,7 +121,12 @@ fn noise_of(sorted: &Sorted) -> Option<Noise> {
 }
 
 /// Range of a cell's points and the standard deviation of their residuals along the beams.
-fn residual(sorted: &Sorted, level: &Level, cell: u32, spots: &mut Vec<Spot>) -> Option<(f32, f64)> {
+fn residual(
+    sorted: &Sorted,
+    level: &Level,
+    cell: u32,
+    spots: &mut Vec<Spot>,
+) -> Option<(f32, f64)> {
     let (_, radius) = gather(sorted, level, cell, None, spots)?;
     let normal = normal_of(spots)?;
     spots.retain(|s| s.beam.dot(&normal) < -NOISE_COSINE);
@@ -147,43 +154,61 @@ fn gather(
     let place = |i: usize| Vector3::from(sorted.shots[i].at.map(f64::from));
     let middle = own.clone().fold(Vector3::zeros(), |sum, i| sum + place(i)) / own.len() as f64;
     let radius = REACH * level.edge;
-    let around: Vec<u32> = level.around(level.cell_of(&place(own.start).into())).collect();
+    let around: Vec<u32> = level
+        .around(level.cell_of(&place(own.start).into()))
+        .collect();
     let total: usize = around.iter().map(|&c| level.points(c).len()).sum();
     if total < sorted.settings.enough {
         return None;
     }
     spots.clear();
     let every = total.div_ceil(MOST_SPOTS);
-    for i in around.into_iter().flat_map(|c| level.points(c)).step_by(every) {
-        let at = place(i) - middle;
-        let share = 1.0 - at.norm_squared() / (radius * radius);
-        if share > 0.0 {
-            let shot = &sorted.shots[i];
-            spots.push(Spot {
-                at,
-                beam: Vector3::from(shot.beam.map(f64::from)),
-                sigma: noise.map_or(UNIT, |n| n.sigma(shot.range)),
-                weight: share * share,
-                pass: (shot.pass % N_PASSES as u32) as u8,
-            });
+    let mut skipped = 0;
+    for cell in around {
+        let points = level.points(cell);
+        for i in (points.start + skipped..points.end).step_by(every) {
+            let (shot, at) = (&sorted.shots[i], place(i) - middle);
+            if at.norm_squared() < radius * radius {
+                spots.push(Spot {
+                    at,
+                    beam: Vector3::from(shot.beam.map(f64::from)),
+                    sigma: noise.map_or(UNIT, |n| n.sigma(shot.range)),
+                    pass: (shot.pass % N_PASSES as u32) as u8,
+                });
+            }
         }
+        // As if the points of all cells were one behind the other.
+        skipped = (skipped + every - points.len() % every) % every;
     }
     (spots.len() * every.min(2) >= sorted.settings.enough / 2).then_some((middle, radius))
 }
 
-fn pieces_of(sorted: &Sorted, level: &Level, cell: u32, noise: &Noise, spots: &mut Vec<Spot>) -> Vec<Piece> {
+fn pieces_of(
+    sorted: &Sorted,
+    level: &Level,
+    cell: u32,
+    noise: &Noise,
+    spots: &mut Vec<Spot>,
+) -> Vec<Piece> {
     let Some((middle, radius)) = gather(sorted, level, cell, Some(noise), spots) else {
         return Vec::new();
     };
-    let Some(normal) = normal_of(spots) else { return Vec::new() };
-    let (front, back): (Vec<Spot>, Vec<Spot>) = spots.iter().partition(|s| s.beam.dot(&normal) < 0.0);
+    let Some(normal) = normal_of(spots) else {
+        return Vec::new();
+    };
+    // Those that beams meet from behind are of another side.
+    spots.sort_by_key(|s| s.beam.dot(&normal) > 0.0);
+    let n_front = spots.partition_point(|s| s.beam.dot(&normal) <= 0.0);
+    let (front, back) = spots.split_at(n_front);
     let mut pieces = Vec::new();
     for side in [front, back] {
         if side.len() < FEWEST_SPOTS {
             continue;
         }
-        for (sheet, half) in sheets_of(&side, radius) {
-            if sheet.n_passes >= sorted.settings.fewest_passes && sheet.n_points >= FEWEST_SPOTS as f64 {
+        for (sheet, half) in sheets_of(side, radius) {
+            if sheet.n_passes >= sorted.settings.fewest_passes
+                && sheet.n_points >= FEWEST_SPOTS as f64
+            {
                 pieces.push(Piece::of(&middle, &sheet, half.as_ref()));
             }
         }
@@ -193,7 +218,9 @@ fn pieces_of(sorted: &Sorted, level: &Level, cell: u32, noise: &Noise, spots: &m
 
 /// One sheet, or two where that is more likely.
 fn sheets_of(spots: &[Spot], radius: f64) -> Vec<(Sheet, Option<Half>)> {
-    let Some(normal) = normal_of(spots) else { return Vec::new() };
+    let Some(normal) = normal_of(spots) else {
+        return Vec::new();
+    };
     let one = Sheet::fit(spots, radius, &normal);
     if one.as_ref().is_none_or(is_suspicious)
         && let Some(pair) = split(spots, radius, &normal, one.as_ref())

@@ -25,7 +25,10 @@ struct Random(u64);
 
 impl Random {
     fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 11) as f64 / (1_u64 << 53) as f64
     }
 
@@ -55,7 +58,8 @@ impl Map {
         let range = gap.iter().map(|g| g * g).sum::<f64>().sqrt();
         let beam = gap.map(|g| g / range);
         let found = range + NOISE * random.normal() + bias;
-        self.points.push([0, 1, 2].map(|a| from[a] + beam[a] * found));
+        self.points
+            .push([0, 1, 2].map(|a| from[a] + beam[a] * found));
         self.beams.push(beam.map(|b| b as f32));
         self.ranges.push(found as f32);
         self.times.push(time);
@@ -64,18 +68,27 @@ impl Map {
     fn refine(&self) -> Refined {
         let mut sample = Sample::new(SETTINGS);
         sample.add(&self.points, &self.beams, &self.ranges, &self.times);
-        sample.fit(None).unwrap().refine(&self.points, &self.beams, &self.ranges)
+        sample
+            .fit(None)
+            .unwrap()
+            .refine(&self.points, &self.beams, &self.ranges)
     }
 
     fn moved(&self) -> Vec<Point> {
         let moves = self.refine().moves;
-        let at = |i: usize| [0, 1, 2].map(|a| self.points[i][a] + f64::from(self.beams[i][a]) * f64::from(moves[i]));
+        let at = |i: usize| {
+            [0, 1, 2].map(|a| self.points[i][a] + f64::from(self.beams[i][a]) * f64::from(moves[i]))
+        };
         (0..self.points.len()).map(at).collect()
     }
 }
 
 /// `n` points of a surface that `surface` draws, each seen from a place that `place` draws.
-fn map_of(n: usize, surface: impl Fn(&mut Random) -> Point, place: impl Fn(&mut Random, &Point) -> Point) -> Map {
+fn map_of(
+    n: usize,
+    surface: impl Fn(&mut Random) -> Point,
+    place: impl Fn(&mut Random, &Point) -> Point,
+) -> Map {
     let (mut map, mut random) = (Map::default(), Random(1));
     add(&mut map, &mut random, n, surface, place);
     map
@@ -98,13 +111,20 @@ fn add(
 
 /// Two to four metres away on the positive side of z.
 fn above(random: &mut Random, _: &Point) -> Point {
-    [random.within(-1.5, 1.5), random.within(-1.5, 1.5), random.within(2.0, 4.0)]
+    [
+        random.within(-1.5, 1.5),
+        random.within(-1.5, 1.5),
+        random.within(2.0, 4.0),
+    ]
 }
 
 fn statistics(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
     let n = values.clone().count() as f64;
     let mean = values.clone().sum::<f64>() / n;
-    (mean, (values.map(|v| (v - mean) * (v - mean)).sum::<f64>() / n).sqrt())
+    (
+        mean,
+        (values.map(|v| (v - mean) * (v - mean)).sum::<f64>() / n).sqrt(),
+    )
 }
 
 fn floor(random: &mut Random, half: f64) -> Point {
@@ -115,7 +135,13 @@ fn floor(random: &mut Random, half: f64) -> Point {
 fn the_points_of_a_plane_come_much_nearer_to_it_without_a_bias() {
     let map = map_of(12_000, |r| floor(r, 1.0), above);
     let (_, raw) = statistics(map.points.iter().map(|p| p[2]));
-    let (mean, std) = statistics(map.moved().iter().map(|p| p[2]).collect::<Vec<_>>().into_iter());
+    let (mean, std) = statistics(
+        map.moved()
+            .iter()
+            .map(|p| p[2])
+            .collect::<Vec<_>>()
+            .into_iter(),
+    );
     assert!(std < 0.3 * raw, "{std} of {raw}");
     assert!(mean.abs() < 2e-4, "{mean}");
 }
@@ -125,7 +151,8 @@ fn the_stated_deviation_is_that_of_the_points() {
     let map = map_of(12_000, |r| floor(r, 1.0), above);
     let refined = map.refine();
     let moved = map.moved();
-    let off = (0..moved.len()).map(|i| moved[i][2] / f64::from(map.beams[i][2]).abs() / f64::from(refined.sigmas[i]));
+    let off = (0..moved.len())
+        .map(|i| moved[i][2] / f64::from(map.beams[i][2]).abs() / f64::from(refined.sigmas[i]));
     let (_, std) = statistics(off.collect::<Vec<_>>().into_iter());
     assert!((0.4..1.6).contains(&std), "{std}");
 }
@@ -135,7 +162,10 @@ fn every_point_stays_on_its_beam() {
     let map = map_of(5_000, |r| floor(r, 1.0), above);
     let refined = map.refine();
     assert!(refined.moves.iter().any(|m| *m != 0.0));
-    assert!(refined.moves.iter().all(|m| m.abs() <= 0.034), "three standard deviations");
+    assert!(
+        refined.moves.iter().all(|m| m.abs() <= 0.034),
+        "three standard deviations"
+    );
 }
 
 #[test]
@@ -157,7 +187,10 @@ fn the_step_of_20_mm_stays_and_its_sides_are_flat() {
         let ((low, _), (high, _)) = (beside(-0.06, 0.0), beside(0.026, 0.086));
         assert!((high - low) > 0.85 * height, "{low} {high}");
         let ((low, a), (high, b)) = (beside(-0.3, -0.1), beside(0.13, 0.3));
-        assert!((high - low - height).abs() < 1e-3 && a.max(b) < 0.005, "{low} {high} {a} {b}");
+        assert!(
+            (high - low - height).abs() < 1e-3 && a.max(b) < 0.005,
+            "{low} {high} {a} {b}"
+        );
     }
 }
 
@@ -177,20 +210,36 @@ fn a_crease_stays_sharp_on_both_of_its_sides() {
             24_000,
             |r| {
                 let (along, y) = (r.within(0.0, 1.0), r.within(-1.0, 1.0));
-                if r.uniform() < 0.5 { [side * along, y, 0.0] } else { [0.0, y, side * along] }
+                if r.uniform() < 0.5 {
+                    [side * along, y, 0.0]
+                } else {
+                    [0.0, y, side * along]
+                }
             },
             |r, _| [r.within(1.0, 3.0), r.within(-1.0, 1.0), r.within(1.0, 3.0)],
         );
         let distance = |p: &Point| {
             if convex == (p[0].max(p[2]) < 0.0) || !convex {
-                if convex { p[0].max(p[2]) } else { p[0].abs().min(p[2].abs()) }
+                if convex {
+                    p[0].max(p[2])
+                } else {
+                    p[0].abs().min(p[2].abs())
+                }
             } else {
                 p[0].max(p[2]).abs()
             }
         };
-        let (before, after) = (at_corner(&map.points, distance), at_corner(&map.moved(), distance));
+        let (before, after) = (
+            at_corner(&map.points, distance),
+            at_corner(&map.moved(), distance),
+        );
         assert!(after < 0.7 * before, "convex {convex}: {after} of {before}");
-        let far: Vec<f64> = map.moved().iter().filter(|p| p[0].abs() > 0.1).map(|p| p[2]).collect();
+        let far: Vec<f64> = map
+            .moved()
+            .iter()
+            .filter(|p| p[0].abs() > 0.1)
+            .map(|p| p[2])
+            .collect();
         let (mean, std) = statistics(far.into_iter());
         assert!(mean.abs() < 5e-4 && std < 0.004, "{mean} {std}");
     }
@@ -206,7 +255,13 @@ fn the_two_sides_of_a_plate_of_40_mm_stay_apart() {
             &mut random,
             8_000,
             |r| [r.within(-0.5, 0.5), r.within(-0.5, 0.5), side],
-            |r, _| [r.within(-1.5, 1.5), r.within(-1.5, 1.5), r.within(2.0, 4.0) * side.signum()],
+            |r, _| {
+                [
+                    r.within(-1.5, 1.5),
+                    r.within(-1.5, 1.5),
+                    r.within(2.0, 4.0) * side.signum(),
+                ]
+            },
         );
     }
     let moved = map.moved();
@@ -223,7 +278,11 @@ fn cylinders_keep_their_radius() {
             n,
             |r| {
                 let angle = r.within(0.0, TAU);
-                [radius * angle.cos(), radius * angle.sin(), r.within(-0.7, 0.7)]
+                [
+                    radius * angle.cos(),
+                    radius * angle.sin(),
+                    r.within(-0.7, 0.7),
+                ]
             },
             |r, p| {
                 let angle = p[1].atan2(p[0]) + r.within(-1.2, 1.2);
@@ -233,7 +292,12 @@ fn cylinders_keep_their_radius() {
         );
         let radii = |points: &[Point]| {
             let inner = points.iter().filter(|p| p[2].abs() < 0.5);
-            statistics(inner.map(|p| p[0].hypot(p[1]) - radius).collect::<Vec<_>>().into_iter())
+            statistics(
+                inner
+                    .map(|p| p[0].hypot(p[1]) - radius)
+                    .collect::<Vec<_>>()
+                    .into_iter(),
+            )
         };
         let ((_, before), (mean, after)) = (radii(&map.points), radii(&map.moved()));
         assert!(mean.abs() < 1e-3, "{radius}: {mean}");
@@ -260,15 +324,31 @@ fn points_of_few_passes_and_lonely_ones_stay() {
     let refined = map.refine();
     assert!(refined.moves[first..].iter().all(|m| *m == 0.0));
     assert!(refined.moves[..first].iter().filter(|m| **m != 0.0).count() > 5_500);
-    assert!(refined.sigmas[lonely..].iter().all(|s| (f64::from(*s) - NOISE).abs() < 0.002));
+    assert!(
+        refined.sigmas[lonely..]
+            .iter()
+            .all(|s| (f64::from(*s) - NOISE).abs() < 0.002)
+    );
 }
 
 #[test]
 fn leaves_without_a_surface_are_not_flattened() {
-    let cloud = |r: &mut Random| [r.within(-0.5, 0.5), r.within(-0.5, 0.5), r.within(-0.5, 0.5)];
+    let cloud = |r: &mut Random| {
+        [
+            r.within(-0.5, 0.5),
+            r.within(-0.5, 0.5),
+            r.within(-0.5, 0.5),
+        ]
+    };
     let mut map = map_of(12_000, cloud, above);
     let mut random = Random(7);
-    add(&mut map, &mut random, 12_000, |r| [r.within(3.0, 5.0), r.within(-1.0, 1.0), 0.0], above);
+    add(
+        &mut map,
+        &mut random,
+        12_000,
+        |r| [r.within(3.0, 5.0), r.within(-1.0, 1.0), 0.0],
+        above,
+    );
     let moves = map.refine().moves;
     let (_, size) = statistics(moves[..12_000].iter().map(|m| f64::from(*m)));
     assert!(size < 0.003, "{size}");
@@ -282,7 +362,13 @@ fn what_the_passes_share_stays_in_the_stated_deviation() {
         let truth = floor(&mut random, 1.0);
         let from = above(&mut random, &truth);
         let time = random.within(0.0, DURATION);
-        map.measure(&mut random, truth, from, time, biases[(time / 0.5) as usize]);
+        map.measure(
+            &mut random,
+            truth,
+            from,
+            time,
+            biases[(time / 0.5) as usize],
+        );
     }
     let sigmas = map.refine().sigmas;
     let (mean, _) = statistics(sigmas.iter().map(|s| f64::from(*s)));
@@ -294,7 +380,10 @@ fn what_the_passes_share_stays_in_the_stated_deviation() {
 fn the_number_of_threads_changes_nothing() {
     let map = map_of(20_000, |r| floor(r, PI), above);
     let with = |n: usize| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap();
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(n)
+            .build()
+            .unwrap();
         pool.install(|| (map.refine().moves, map.refine().sigmas))
     };
     assert_eq!(with(1), with(3));

@@ -30,6 +30,7 @@ def command(
     map_spacing: options.Spacing = None,
     keep_moving: options.KeepMoving = False,
     keep_mixed: options.KeepMixed = False,
+    no_refine: options.NoRefine = False,
     georeference: options.Georeference = None,
     epsg: options.Epsg = None,
     control_points: options.ControlPoints = None,
@@ -57,6 +58,7 @@ def command(
             **given(mode=georeference, epsg=epsg, control_points=control_points)
         ),
         cleaning=CleanSettings(**options.cleaning(keep_mixed=keep_mixed, keep_moving=keep_moving)),
+        refine=not no_refine,
         threads=threads,
         progress=create_progress(quiet=quiet),
     )

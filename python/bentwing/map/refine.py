@@ -52,7 +52,7 @@ def refine(
     chunks : with the beams of their points and the ranges as measured
     folder : of the temporary file, about 70 bytes per point
     counts : receives `map.refined`, the points that were moved
-    record : receives `moved`, `median_move`, `range_sigma` and `sigma`, see `Tally`
+    record : receives `moved`, the share, and its medians `move`, `sigma_before` and `sigma`, m
     threads : default: all cores
 
     Yields
@@ -72,12 +72,14 @@ def refine(
         for slab in sorted(slabs, key=lambda slab: -slab.n_points):
             tables = lambda: map(_chunk, spool.tables())  # noqa: E731 - as short as a name
             surfaces = _surfaces(tables, slab, noise, threads or 0)
-            noise = None if surfaces is None else surfaces.noise
+            noise = noise if surfaces is None else surfaces.noise
             for found in _moves(tables, slab, surfaces, threads or 0):
                 refined[slab.number].add(found)
         moves = [own.tables() for own in refined]
         for columns in spool.tables():
-            yield tally.watch(_moved(_chunk(columns), slabs, moves))
+            moved = _moved(_chunk(columns), slabs, moves)
+            tally.add(moved, noise)
+            yield moved
     if counts is not None:
         counts["map.refined"] = tally.n_moved
     if record is not None:
@@ -190,24 +192,25 @@ class Tally:
         self._sigmas = np.zeros(_N_STEPS, np.int64)
         self._before = np.zeros(_N_STEPS, np.int64)
 
-    def watch(self, chunk: MapChunk) -> MapChunk:
-        """Count a refined chunk; returns it."""
-        if chunk.shift is None or chunk.sigma is None:
-            return chunk
-        moved = chunk.shift != 0
+    def add(self, chunk: MapChunk, noise: _core.RangeNoise | None) -> None:
+        """Count a refined chunk."""
         self.n_points += len(chunk)
+        if chunk.shift is None or chunk.sigma is None or noise is None:
+            return
+        moved = chunk.shift != 0
         self.n_moved += int(np.count_nonzero(moved))
         self._shifts += _histogram(np.abs(chunk.shift[moved]))
         self._sigmas += _histogram(chunk.sigma[moved])
-        return chunk
+        self._before += _histogram(noise.sigmas(chunk.ranges[moved]))
 
     def to_json(self) -> dict[str, float | None]:
-        """Return the share that was moved, and of it the medians of move and standard deviation, m."""
+        """Return the share that was moved, and its medians, m: of the moves, and of the standard deviations."""
         share = self.n_moved / self.n_points if self.n_points else None
         return {
             "moved": share,
-            "median_move": _median(self._shifts),
-            "median_sigma": _median(self._sigmas),
+            "move": _median(self._shifts),
+            "sigma_before": _median(self._before),
+            "sigma": _median(self._sigmas),
         }
 
 

@@ -216,8 +216,8 @@ class SurfaceSample:
     pass_length : s, what is measured within it shares the error of the trajectory
     """
 
-    def __new__(
-        cls,
+    def __init__(
+        self,
         *,
         edge: float,
         n_levels: int,
@@ -225,7 +225,7 @@ class SurfaceSample:
         fewest_passes: float,
         most_noise: float,
         pass_length: float,
-    ) -> Self: ...
+    ) -> None: ...
     def add(
         self,
         points: NDArray[np.float64],

@@ -216,8 +216,8 @@ class SurfaceSample:
     pass_length : s, what is measured within it shares the error of the trajectory
     """
 
-    def __init__(
-        self,
+    def __new__(
+        cls,
         *,
         edge: float,
         n_levels: int,
@@ -225,7 +225,7 @@ class SurfaceSample:
         fewest_passes: float,
         most_noise: float,
         pass_length: float,
-    ) -> None: ...
+    ) -> SurfaceSample: ...
     def add(
         self,
         points: NDArray[np.float64],

@@ -71,7 +71,8 @@ impl Piece {
         // Neither is divided by the length of the normal, so that the move, their ratio, needs none.
         let squared_length = 1.0 + du * du + dv * dv;
         let slope = along[2] - du * along[0] - dv * along[1];
-        if slope * slope < GRAZING * GRAZING * squared_length {
+        // A beam from behind has met the other side of something thin.
+        if slope > 0.0 || slope * slope < GRAZING * GRAZING * squared_length {
             return None;
         }
         let measured = slope * slope * sigma * sigma;

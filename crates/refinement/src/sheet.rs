@@ -22,6 +22,8 @@ const PLANE: usize = 3;
 const QUADRIC: usize = 6;
 /// A surface cannot be told from another one that a beam meets at less than this cosine.
 const GRAZING: f64 = 0.05;
+/// Price of a parameter.
+const CURVES: f64 = 2.0;
 
 /// A point near the middle of a piece.
 #[derive(Clone, Copy, Debug)]
@@ -164,7 +166,8 @@ impl Sheet {
         self.normal = (self.axes.transpose() * up).normalize();
     }
 
-    /// Plane or quadric, by the Bayesian information criterion.
+    /// Plane or quadric, by Akaike's information criterion: a curve that is too weak for the Bayesian one
+    /// would still shift a cylinder by a millimetre.
     fn choose(&mut self, sums: &Sums) -> Option<()> {
         let plane = sums.plane()?;
         (self.heights, self.n_parameters) = (plane, PLANE);
@@ -175,7 +178,7 @@ impl Sheet {
         if let Some(quadric) = sums.quadric() {
             let (flat, curved) = (sums.misfit(&plane), sums.misfit(&quadric));
             let left = (curved / freedom).max(1.0);
-            if (flat - curved) / left > (QUADRIC - PLANE) as f64 * sums.n.ln() {
+            if (flat - curved) / left > CURVES * (QUADRIC - PLANE) as f64 {
                 (self.heights, self.n_parameters) = (quadric, QUADRIC);
             }
         }

@@ -52,11 +52,18 @@ pub(crate) fn split(
 ) -> Option<Pair> {
     let coarse = best_line(spots, normal)?;
     let pair = fit_halves(spots, radius, coarse)?;
-    let better = follow(spots, &pair, normal).and_then(|line| fit_halves(spots, radius, line));
-    let pair = match better {
-        Some(found) if cost(&found) < cost(&pair) => found,
-        _ => pair,
-    };
+    let lines = [crease(&pair), step(spots, &pair, normal)];
+    let others = lines
+        .into_iter()
+        .flatten()
+        .filter_map(|line| fit_halves(spots, radius, line));
+    let pair = others.fold(pair, |best, other| {
+        if cost(&other) < cost(&best) {
+            other
+        } else {
+            best
+        }
+    });
     is_better(&pair, one).then_some(pair)
 }
 
@@ -118,13 +125,9 @@ fn best_line(spots: &[Spot], normal: &Vector3<f64>) -> Option<Half> {
     best.map(|(_, half)| half)
 }
 
-/// The line that two sheets themselves tell.
-fn follow(spots: &[Spot], pair: &Pair, normal: &Vector3<f64>) -> Option<Half> {
+/// The line of a step between two sheets, which leaves each spot on the one that it fits.
+fn step(spots: &[Spot], pair: &Pair, normal: &Vector3<f64>) -> Option<Half> {
     let (a, b) = (&pair[0].0, &pair[1].0);
-    let turned = a.normal - b.normal;
-    if turned.norm() > CREASE {
-        return crease(pair, &turned);
-    }
     let across = normal.cross(&pair[0].1.direction);
     let mut best: Option<(f64, Half)> = None;
     for turn in TURNS {
@@ -147,8 +150,12 @@ fn follow(spots: &[Spot], pair: &Pair, normal: &Vector3<f64>) -> Option<Half> {
     best.map(|(_, half)| half)
 }
 
-/// The plane between two planes that meet.
-fn crease(pair: &Pair, turned: &Vector3<f64>) -> Option<Half> {
+/// The plane between two sheets that meet.
+fn crease(pair: &Pair) -> Option<Half> {
+    let turned = pair[0].0.normal - pair[1].0.normal;
+    if turned.norm() < CREASE {
+        return None;
+    }
     let direction = turned.normalize();
     // The signed distances from both are the same on it.
     let offset = (pair[1].0.height_of_middle() - pair[0].0.height_of_middle()) / turned.norm();

@@ -24,7 +24,7 @@ const NOISE_COSINE: f64 = 0.5;
 /// Cells per parallel task; fixed, so that results do not depend on the number of threads.
 const CHUNK: usize = 64;
 /// Residuals beyond this many standard deviations of what noise alone would make show a second sheet.
-const SUSPICIOUS: f64 = 2.0;
+const SUSPICIOUS: f64 = 1.0;
 
 /// The sheets of the cells of one size, by the numbers of the cells.
 #[derive(Clone, Debug)]

@@ -13,7 +13,7 @@ const SETTINGS: Settings = Settings {
     enough: 80,
     fewest_passes: 5.0,
     most_noise: 0.03,
-    pass: 0.5,
+    pass: 0.25,
 };
 const NOISE: f64 = 0.01;
 const DURATION: f64 = 30.0;
@@ -313,7 +313,7 @@ fn points_of_few_passes_and_lonely_ones_stay() {
     let first = map.points.len();
     for _ in 0..6_000 {
         let truth = [random.within(4.0, 6.0), random.within(-1.0, 1.0), 0.0];
-        let time = random.within(0.0, 1.0);
+        let time = random.within(0.0, 0.9);
         map.measure(&mut random, truth, [5.0, 0.0, 3.0], time, 0.0);
     }
     let lonely = map.points.len();
@@ -357,7 +357,7 @@ fn leaves_without_a_surface_are_not_flattened() {
 #[test]
 fn what_the_passes_share_stays_in_the_stated_deviation() {
     let (mut map, mut random) = (Map::default(), Random(9));
-    let biases: Vec<f64> = (0..60).map(|_| 0.01 * random.normal()).collect();
+    let biases: Vec<f64> = (0..120).map(|_| 0.01 * random.normal()).collect();
     for _ in 0..12_000 {
         let truth = floor(&mut random, 1.0);
         let from = above(&mut random, &truth);
@@ -367,13 +367,13 @@ fn what_the_passes_share_stays_in_the_stated_deviation() {
             truth,
             from,
             time,
-            biases[(time / 0.5) as usize],
+            biases[(time / 0.25) as usize],
         );
     }
     let sigmas = map.refine().sigmas;
     let (mean, _) = statistics(sigmas.iter().map(|s| f64::from(*s)));
-    // Sixty passes of 10 mm each leave 1.3 mm that no averaging of points takes away.
-    assert!(mean > 0.0013, "{mean}");
+    // So many passes of 10 mm each leave 0.9 mm that no averaging of points takes away.
+    assert!(mean > 0.0009, "{mean}");
 }
 
 #[test]

@@ -25,7 +25,9 @@ N_LEVELS = 4  # sizes of cells, each twice as large as the one before
 ENOUGH = 80  # points around the middle of a cell; fewer are averaged too little
 FEWEST_PASSES = 5.0  # effective number that must have seen a surface
 MOST_NOISE = 0.03  # m, of a range; what looks noisier is the shape of things
-PASS_LENGTH = 0.5  # s; what is measured within it shares the error of the trajectory
+# s; what is measured within it shares the error of the trajectory. A head that turns sees a surface in it
+# once.
+PASS_LENGTH = 0.25
 MOST_POINTS = 4_000_000  # that surfaces are found from at a time, about 100 bytes each
 # m; surfaces reach one and a half of the largest cells from their middle, which may be a cell away.
 HALO = 1.5

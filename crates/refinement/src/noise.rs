@@ -20,18 +20,18 @@ pub struct Noise([f64; N_STEPS]);
 
 /// Step of a range.
 #[inline]
-pub(crate) fn step_of(range: f32) -> usize {
+pub(crate) fn step_of(range: f32) -> u8 {
     let octaves = (range / FIRST).max(1.0).log2();
-    ((2.0 * octaves) as usize).min(N_STEPS - 1)
+    ((2.0 * octaves) as u8).min(N_STEPS as u8 - 1)
 }
 
 impl Noise {
-    /// From the ranges (m) of smooth sheets and the standard deviations of their residuals along the
+    /// From the steps of the ranges of smooth sheets and the standard deviations of their residuals along the
     /// beams, none above `most`; none without sheets.
-    pub(crate) fn of(found: &[(f32, f64)], most: f64) -> Option<Self> {
+    pub(crate) fn of(found: &[(u8, f64)], most: f64) -> Option<Self> {
         let mut steps: [Vec<f64>; N_STEPS] = Default::default();
-        for &(range, sigma) in found {
-            steps[step_of(range)].push(sigma);
+        for &(step, sigma) in found {
+            steps[usize::from(step)].push(sigma);
         }
         let mut all: Vec<f64> = found.iter().map(|f| f.1).collect();
         let usual = quantile(&mut all)?.min(most);
@@ -54,12 +54,12 @@ impl Noise {
     /// Of a range, m.
     #[inline]
     pub fn sigma(&self, range: f32) -> f64 {
-        self.0[step_of(range)]
+        self.of_step(step_of(range))
     }
 
-    /// By the steps of half an octave, m.
-    pub fn sigmas(&self) -> &[f64] {
-        &self.0
+    #[inline]
+    pub(crate) fn of_step(&self, step: u8) -> f64 {
+        self.0[usize::from(step)]
     }
 }
 
@@ -84,9 +84,9 @@ mod tests {
 
     #[test]
     fn each_range_has_the_noise_of_its_sheets_and_others_that_of_the_nearest() {
-        let near = (0..100).map(|i| (2.0, 0.01 + 1e-5 * f64::from(i)));
-        let far = (0..100).map(|i| (16.0, 0.03 + 1e-5 * f64::from(i)));
-        let found: Vec<(f32, f64)> = near.chain(far).collect();
+        let near = (0..100).map(|i| (step_of(2.0), 0.01 + 1e-5 * f64::from(i)));
+        let far = (0..100).map(|i| (step_of(16.0), 0.03 + 1e-5 * f64::from(i)));
+        let found: Vec<(u8, f64)> = near.chain(far).collect();
         let noise = Noise::of(&found, 0.05).unwrap();
         assert!((noise.sigma(2.0) - 0.0103).abs() < 1e-9);
         assert!((noise.sigma(16.0) - 0.0303).abs() < 1e-9);
@@ -101,9 +101,9 @@ mod tests {
 
     #[test]
     fn leaves_that_are_near_do_not_make_ranges_noisy() {
-        let leaves = (0..100).map(|_| (2.0, 0.07));
-        let walls = (0..100).map(|_| (4.0, 0.01));
-        let found: Vec<(f32, f64)> = leaves.chain(walls).collect();
+        let leaves = (0..100).map(|_| (step_of(2.0), 0.07));
+        let walls = (0..100).map(|_| (step_of(4.0), 0.01));
+        let found: Vec<(u8, f64)> = leaves.chain(walls).collect();
         let noise = Noise::of(&found, 0.05).unwrap();
         assert!(noise.sigma(2.0) < 0.0125);
         assert!(Noise::of(&found, 0.005).unwrap().sigma(4.0) <= 0.005);

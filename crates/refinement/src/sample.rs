@@ -4,6 +4,7 @@
 use rayon::prelude::*;
 
 use crate::grid::{Level, code_of};
+use crate::noise::step_of;
 
 /// How surfaces are found.
 #[derive(Clone, Copy, Debug)]
@@ -28,8 +29,9 @@ pub(crate) struct Shot {
     /// From the first point of the sample, m.
     pub at: [f32; 3],
     pub beam: [f32; 3],
-    pub range: f32,
-    pub pass: u32,
+    /// Of the range.
+    pub step: u8,
+    pub pass: u16,
 }
 
 /// Points of a part of a map, in any order.
@@ -68,8 +70,8 @@ impl Sample {
             self.shots.push(Shot {
                 at: [0, 1, 2].map(|a| (p[a] - origin[a]) as f32),
                 beam: beams[i],
-                range: ranges[i],
-                pass: (times[i] / self.settings.pass).floor() as i64 as u32,
+                step: step_of(ranges[i]),
+                pass: (times[i] / self.settings.pass).floor() as i64 as u16,
             });
         }
     }

@@ -2,7 +2,6 @@
 //! Two sheets that meet at a line: a crease, or a step.
 
 use bentwing_trajectory::so3;
-use bentwing_voxels::sym3;
 use nalgebra::{Matrix3, Vector3};
 
 use crate::sheet::{Sheet, Spot, normal_of};
@@ -16,6 +15,8 @@ const FEWEST: usize = 8;
 const CREASE: f64 = 0.15;
 /// Parameters of the line.
 const LINE: usize = 2;
+/// Steps of Newton's method.
+const NEWTON: usize = 5;
 /// Turns of the line of a step that are tried once more, rad.
 const TURNS: [f64; 5] = [-0.2, -0.1, 0.0, 0.1, 0.2];
 
@@ -204,6 +205,49 @@ impl Sums {
     fn squares(&self) -> f64 {
         let mean = self.first / self.w;
         let covariance = self.second / self.w - mean * mean.transpose();
-        sym3::eigen(&covariance).values[0].max(0.0) * self.w
+        smallest_eigenvalue(&covariance) * self.w
+    }
+}
+
+/// Of a covariance, by Newton's method: below its smallest root the characteristic polynomial is steep and
+/// bends away, so that the steps from 0 never pass the root. Several times as fast as the trigonometric
+/// formula.
+fn smallest_eigenvalue(a: &Matrix3<f64>) -> f64 {
+    let trace = a.trace();
+    let minors = a[(0, 0)] * a[(1, 1)] - a[(0, 1)] * a[(0, 1)] + a[(0, 0)] * a[(2, 2)]
+        - a[(0, 2)] * a[(0, 2)]
+        + a[(1, 1)] * a[(2, 2)]
+        - a[(1, 2)] * a[(1, 2)];
+    let determinant = a.determinant();
+    let mut root = 0.0;
+    for _ in 0..NEWTON {
+        let value = ((root - trace) * root + minors) * root - determinant;
+        let slope = (3.0 * root - 2.0 * trace) * root + minors;
+        if slope <= 0.0 {
+            break;
+        }
+        root -= value / slope;
+    }
+    root.max(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bentwing_voxels::sym3;
+    use nalgebra::UnitQuaternion;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn the_smallest_eigenvalue_is_that_of_the_formula(
+            small in 1e-6..1e-3_f64, f2 in 1.5..100.0_f64, f3 in 1.0..10.0_f64,
+            a in -3.0..3.0_f64, b in -3.0..3.0_f64, c in -3.0..3.0_f64,
+        ) {
+            let values = Vector3::new(small, small * f2, small * f2 * f3);
+            let R = UnitQuaternion::from_euler_angles(a, b, c).to_rotation_matrix().into_inner();
+            let m = R * Matrix3::from_diagonal(&values) * R.transpose();
+            prop_assert!((smallest_eigenvalue(&m) - sym3::eigen(&m).values[0]).abs() < 1e-2 * small);
+        }
     }
 }

@@ -24,7 +24,7 @@ const NOISE_COSINE: f64 = 0.5;
 /// Cells per parallel task; fixed, so that results do not depend on the number of threads.
 const CHUNK: usize = 64;
 /// Residuals beyond this many standard deviations of what noise alone would make show a second sheet.
-const SUSPICIOUS: f64 = 1.0;
+const SUSPICIOUS: f64 = 1.5;
 
 /// The sheets of the cells of one size, by the numbers of the cells.
 #[derive(Clone, Debug)]
@@ -110,7 +110,7 @@ fn noise_of(sorted: &Sorted) -> Option<Noise> {
     let mut found = Vec::new();
     for level in &sorted.levels {
         let cells: Vec<u32> = (0..level.n_cells() as u32).step_by(NOISE_EVERY).collect();
-        let of_level: Vec<Option<(f32, f64)>> = cells
+        let of_level: Vec<Option<(u8, f64)>> = cells
             .par_iter()
             .with_min_len(CHUNK)
             .map_init(Vec::new, |spots, &c| residual(sorted, level, c, spots))
@@ -120,13 +120,8 @@ fn noise_of(sorted: &Sorted) -> Option<Noise> {
     Noise::of(&found, sorted.settings.most_noise)
 }
 
-/// Range of a cell's points and the standard deviation of their residuals along the beams.
-fn residual(
-    sorted: &Sorted,
-    level: &Level,
-    cell: u32,
-    spots: &mut Vec<Spot>,
-) -> Option<(f32, f64)> {
+/// Step of the range of a cell's points and the standard deviation of their residuals along the beams.
+fn residual(sorted: &Sorted, level: &Level, cell: u32, spots: &mut Vec<Spot>) -> Option<(u8, f64)> {
     let (_, radius) = gather(sorted, level, cell, None, spots)?;
     let normal = normal_of(spots)?;
     spots.retain(|s| s.beam.dot(&normal) < -NOISE_COSINE);
@@ -135,8 +130,8 @@ fn residual(
     }
     let sheet = Sheet::fit(spots, radius, &normal)?;
     let own = level.points(cell);
-    let range = sorted.shots[own.start + own.len() / 2].range;
-    (sheet.n_passes >= sorted.settings.fewest_passes).then_some((range, sheet.scale.sqrt() * UNIT))
+    let step = sorted.shots[own.start + own.len() / 2].step;
+    (sheet.n_passes >= sorted.settings.fewest_passes).then_some((step, sheet.scale.sqrt() * UNIT))
 }
 
 /// Of a range where the noise is not known, m.
@@ -172,8 +167,8 @@ fn gather(
                 spots.push(Spot {
                     at,
                     beam: Vector3::from(shot.beam.map(f64::from)),
-                    sigma: noise.map_or(UNIT, |n| n.sigma(shot.range)),
-                    pass: (shot.pass % N_PASSES as u32) as u8,
+                    sigma: noise.map_or(UNIT, |n| n.of_step(shot.step)),
+                    pass: (usize::from(shot.pass) % N_PASSES) as u8,
                 });
             }
         }

@@ -73,7 +73,7 @@ def row(scenario: Scenario) -> str:
         seconds = time.perf_counter() - start
         truth = simulated.Truth(folder)
         placed = absolute_error(trajectory, truth.trajectory, during=truth.flight).alignment
-    cells = compare(chunks, refined, placed, truth)
+        cells = compare(chunks, refined, placed, truth)
     n = sum(len(chunk) for chunk in chunks)
     name = f"{scenario.scene} {scenario.head} {scenario.seed}"
     left = [f"{record['moved']:.1%}", *cells[-2:], f"{1e6 * seconds / n:.2f}"]

@@ -36,11 +36,8 @@ impl Surfaces {
     fn refine_one(&self, point: &[f64; 3], beam: &[f32; 3], range: f32) -> (f32, f32) {
         let at = [0, 1, 2].map(|a| (point[a] - self.origin[a]) as f32);
         let sigma = self.noise.sigma(range) as f32;
-        let layers = self.layers.iter();
-        match layers
-            .filter_map(|layer| of_layer(layer, &at, beam, sigma))
-            .next()
-        {
+        let mut layers = self.layers.iter();
+        match layers.find_map(|layer| of_layer(layer, &at, beam, sigma)) {
             Some((shift, variance)) if shift.abs() <= FARTHEST * sigma => (shift, variance.sqrt()),
             _ => (0.0, sigma),
         }

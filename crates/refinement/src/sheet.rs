@@ -305,6 +305,16 @@ pub(crate) fn normal_of(spots: &[Spot]) -> Option<Vector3<f64>> {
     })
 }
 
+/// Where the product of two of the terms 1, u, v, u², uv, v² is among the sums.
+const PLACES: [[usize; 6]; 6] = [
+    [0, 1, 2, 3, 4, 5],
+    [1, 3, 4, 6, 7, 8],
+    [2, 4, 5, 7, 8, 9],
+    [3, 6, 7, 10, 11, 12],
+    [4, 7, 8, 11, 12, 13],
+    [5, 8, 9, 12, 13, 14],
+];
+
 /// Normal equations of heights.
 struct Sums {
     /// Of the weights.
@@ -347,15 +357,6 @@ impl Sums {
             squares += wh * h;
             n += l.weight;
         }
-        // Where the product of two of the terms 1, u, v, u², uv, v² is among the sums.
-        const PLACES: [[usize; 6]; 6] = [
-            [0, 1, 2, 3, 4, 5],
-            [1, 3, 4, 6, 7, 8],
-            [2, 4, 5, 7, 8, 9],
-            [3, 6, 7, 10, 11, 12],
-            [4, 7, 8, 11, 12, 13],
-            [5, 8, 9, 12, 13, 14],
-        ];
         Self {
             n,
             matrix: Matrix6::from_fn(|i, j| a[PLACES[i][j]]),

@@ -119,7 +119,8 @@ def _maps(
         _figure(views.side, "Side view", "along the longer extent of the map", wide=True),
         _figure(views.section, "Section", f"{SLAB:g} m thick, through the middle of the path", wide=True),
     ]  # fmt: skip
-    return f'<h2>Map</h2><div class="grid">{"".join(figures)}</div>'
+    said = sections.refinement_sentence((record.get("map") or {}).get("refinement"))
+    return f'<h2>Map</h2>{said}<div class="grid">{"".join(figures)}</div>'
 
 
 def _coverage(

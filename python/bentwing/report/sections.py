@@ -102,6 +102,20 @@ def tiles(record: Mapping[str, Any], trajectory: Trajectory, points: NDArray[np.
     return f'<div class="tiles">{"".join(cells)}</div>'
 
 
+def refinement_sentence(found: Mapping[str, Any] | None) -> str:
+    """Say how many points were moved along their beams, by how much, and what is left."""
+    if found is None:
+        return ""
+    if not found.get("moved"):
+        return "<p>No point was moved: there is no surface that enough passes have seen.</p>"
+    move, before, after = (1000 * found[name] for name in ("move", "sigma_before", "sigma"))
+    return (
+        f"<p>{found['moved']:.0%} of the points were moved along their beams to the surface that they measured "
+        f"together, by {move:.1f} mm in the median; one standard deviation along the beam was {before:.1f} mm "
+        f"and is {after:.1f} mm. The pictures and the accuracy below show the points as measured.</p>"
+    )
+
+
 def _parts(trajectory: Trajectory) -> list[Trajectory]:
     """Return the trajectories of runs that were joined one after the other, with a pause between."""
     cuts = [0, *(np.flatnonzero(np.diff(trajectory.times) > _PAUSE) + 1), len(trajectory.times)]

@@ -20,7 +20,7 @@ import numpy as np
 from bentwing.base.atomic import TEMPORARY_SUFFIX
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator, Mapping, Sequence
     from pathlib import Path
     from types import TracebackType
 
@@ -87,14 +87,22 @@ class ArraySpool:
         n_rows = len(ordered[0][1]) if ordered else 0
         self._tables.extend((self._layouts.setdefault(layout, len(self._layouts)), n_rows))
 
-    def tables(self) -> Iterator[dict[str, NDArray[Any]]]:
-        """Yield the tables; several looks may go on at the same time, but none while tables are added."""
+    def tables(self, wanted: Sequence[bool] | None = None) -> Iterator[dict[str, NDArray[Any]]]:
+        """Yield the tables; several looks may go on at the same time, but none while tables are added.
+
+        Parameters
+        ----------
+        wanted : of each table, whether to read it; default: all
+        """
         layouts, offset = list(self._layouts), 0
-        for number, n_rows in zip(self._tables[::2], self._tables[1::2], strict=True):
+        for i, (number, n_rows) in enumerate(
+            zip(self._tables[::2], self._tables[1::2], strict=True)
+        ):
             layout = layouts[number]
-            data = self._read(offset, n_rows * sum(_row_size(column) for column in layout))
-            offset += len(data)
-            yield _columns(data, layout, n_rows)
+            n_bytes = n_rows * sum(_row_size(column) for column in layout)
+            if wanted is None or wanted[i]:
+                yield _columns(self._read(offset, n_bytes), layout, n_rows)
+            offset += n_bytes
 
     def close(self) -> None:
         """Let go of everything; what could not be written need not be."""

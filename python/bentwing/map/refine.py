@@ -28,7 +28,7 @@ MOST_NOISE = 0.03  # m, of a range; what looks noisier is the shape of things
 # s; what is measured within it shares the error of the trajectory. A head that turns sees a surface in it
 # once.
 PASS_LENGTH = 0.25
-MOST_POINTS = 4_000_000  # that surfaces are found from at a time, about 100 bytes each
+MOST_POINTS = 3_000_000  # that surfaces are found from at a time, about 150 bytes each
 # m; surfaces reach one and a half of the largest cells from their middle, which may be a cell away.
 HALO = 1.5
 _HELD = 32_000_000  # bytes of moves that need no file
@@ -65,14 +65,15 @@ def refine(
     with ExitStack() as stack:
         spool = stack.enter_context(ArraySpool(folder))
         layout = _Layout()
-        for chunk in chunks:
+        for chunk in filter(len, chunks):
             layout.add(chunk)
             spool.add(columns_of(chunk))
         slabs = layout.slabs()
         refined = [stack.enter_context(ArraySpool(folder, held=_HELD // len(slabs))) for _ in slabs]
         noise: _core.RangeNoise | None = None
         for slab in sorted(slabs, key=lambda slab: -slab.n_points):
-            tables = lambda: map(_chunk, spool.tables())  # noqa: E731 - as short as a name
+            near = layout.near(slab)
+            tables = lambda near=near: map(_chunk, spool.tables(near))  # noqa: E731 - as short as a name
             surfaces = _surfaces(tables, slab, noise, threads or 0)
             noise = noise if surfaces is None else surfaces.noise
             for found in _moves(tables, slab, surfaces, threads or 0):
@@ -109,11 +110,18 @@ class _Layout:
 
     def __init__(self) -> None:
         self._axes: tuple[Counter[int], ...] = (Counter(), Counter(), Counter())
+        self._bounds: list[tuple[NDArray[np.float64], NDArray[np.float64]]] = []
 
     def add(self, chunk: MapChunk) -> None:
+        self._bounds.append((chunk.points.min(axis=0), chunk.points.max(axis=0)))
         for axis, counted in enumerate(self._axes):
             metres, numbers = np.unique(np.floor(chunk.points[:, axis]), return_counts=True)
             counted.update(dict(zip(metres.astype(int).tolist(), numbers.tolist(), strict=True)))
+
+    def near(self, slab: _Slab) -> list[bool]:
+        """Return of each chunk whether some of it may be in a slab or around it; others are not read."""
+        low, high, axis = slab.low - HALO, slab.high + HALO, slab.axis
+        return [bool(a[axis] < high and b[axis] >= low) for a, b in self._bounds]
 
     def slabs(self) -> list[_Slab]:
         """Cut along the longest axis, so that a slab has `MOST_POINTS` where a metre has not more."""
@@ -148,7 +156,7 @@ def _surfaces(
         pass_length=PASS_LENGTH,
     )
     for chunk in tables():
-        near = chunk.where(np.flatnonzero(slab.holds(chunk.points, HALO))[::every])
+        near = chunk.where(slab.holds(chunk.points, HALO)).where(slice(None, None, every))
         sample.add(near.points, beams=_beams(near), ranges=near.ranges, times=near.times)
     return sample.fit(noise=noise, threads=threads)
 

@@ -156,7 +156,9 @@ def _surfaces(
         pass_length=PASS_LENGTH,
     )
     for chunk in tables():
-        near = chunk.where(slab.holds(chunk.points, HALO)).where(slice(None, None, every))
+        chosen = slab.holds(chunk.points, HALO)
+        chosen &= np.cumsum(chosen) % every == 0
+        near = chunk.where(chosen)
         sample.add(near.points, beams=_beams(near), ranges=near.ranges, times=near.times)
     return sample.fit(noise=noise, threads=threads)
 

@@ -68,6 +68,8 @@ def las_records(
     ring: NDArray[np.uint16] | None,
     incidence: NDArray[np.float32] | None,
     thickness: NDArray[np.float32] | None,
+    shift: NDArray[np.float32] | None,
+    sigma: NDArray[np.float32] | None,
     run_id: NDArray[np.uint16] | None,
     stored: Sequence[str],
     offsets: tuple[float, float, float],
@@ -78,7 +80,7 @@ def las_records(
 ) -> NDArray[np.uint8]:
     """Return points as the records of a LAS 1.4 file, point format 6, one behind the other.
 
-    Angles are rounded to an eighth of a degree, thicknesses to 1/8192 m: further digits mean nothing, and
+    Angles are rounded to an eighth of a degree, short lengths to 1/8192 m: further digits mean nothing, and
     would be most of what a compressed point takes. Intensities that are no numbers are 0.
 
     Parameters
@@ -199,6 +201,80 @@ class MapCells:
 
         Incidence and thickness are NaN where there is no surface; a point is supported where other
         points say that there is something.
+        """
+
+@final
+class RangeNoise:
+    """How noisy the ranges of a map are, as its smooth surfaces show it."""
+
+    def sigmas(self, ranges: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return the standard deviations of ranges, m."""
+
+@final
+class SurfaceSample:
+    """Takes the points of a part of a map.
+
+    Parameters
+    ----------
+    edge : m, of the smallest cells
+    n_levels : sizes of cells, each twice as large as the one before
+    enough : points around the middle of a cell that make it large enough
+    fewest_passes : effective number that must have seen a surface
+    most_noise : m, of a range
+    pass_length : s, what is measured within it shares the error of the trajectory
+    """
+
+    def __new__(
+        cls,
+        *,
+        edge: float,
+        n_levels: int,
+        enough: int,
+        fewest_passes: float,
+        most_noise: float,
+        pass_length: float,
+    ) -> SurfaceSample: ...
+    def add(
+        self,
+        points: NDArray[np.float64],
+        *,
+        beams: NDArray[np.float32],
+        ranges: NDArray[np.float32],
+        times: NDArray[np.float64],
+    ) -> None:
+        """Add points (N, 3) m, map frame, with the unit directions, lengths (m) and times (s) of their beams."""
+
+    def fit(self, *, noise: RangeNoise | None = None, threads: int = 0) -> Surfaces | None:
+        """Find the surfaces; ends the sample.
+
+        Parameters
+        ----------
+        noise : of the ranges; default: that which the smooth surfaces show
+
+        Returns
+        -------
+        None where there is no smooth surface.
+        """
+
+@final
+class Surfaces:
+    """Surfaces of a part of a map."""
+
+    @property
+    def noise(self) -> RangeNoise:
+        """The noise of the ranges."""
+
+    def refine(
+        self,
+        points: NDArray[np.float64],
+        *,
+        beams: NDArray[np.float32],
+        ranges: NDArray[np.float32],
+        threads: int = 0,
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Return moves along the beams (m, away from the lidar; 0 where a point stays) and what is left.
+
+        The latter is the standard deviation along the beam, m.
         """
 
 @final

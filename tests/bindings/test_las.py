@@ -10,7 +10,7 @@ import pytest
 from bentwing import _core
 from bentwing.base.errors import EstimationError
 
-STORED = ("ring", "incidence", "run_id")
+STORED = ("ring", "incidence", "shift", "sigma", "run_id")
 OFFSETS, STEP = (1000.0, 0.0, -2000.0), 1e-4
 
 
@@ -26,6 +26,8 @@ def some_columns(n: int) -> dict[str, np.ndarray]:
         "ring": rng.integers(0, 2**16, n, np.uint16),
         "incidence": angles,
         "thickness": rng.uniform(0.0, 0.1, n).astype(np.float32),
+        "shift": rng.uniform(-0.03, 0.03, n).astype(np.float32),
+        "sigma": rng.uniform(0.0, 0.02, n).astype(np.float32),
         "run_id": rng.integers(0, 9, n, np.uint16),
     }
 
@@ -43,7 +45,8 @@ def records(points: np.ndarray, columns: dict[str, np.ndarray], **others: object
 
 def header() -> laspy.LasHeader:
     made = laspy.LasHeader(point_format=6, version="1.4")
-    for name, kind in [("range", "f4"), ("ring", "u2"), ("incidence", "f4"), ("run_id", "u2")]:
+    kinds = {"range": "f4", "ring": "u2", "incidence": "f4", "shift": "f4", "sigma": "f4"}
+    for name, kind in {**kinds, "run_id": "u2"}.items():
         made.add_extra_dim(laspy.ExtraBytesParams(name, kind))
     return made
 
@@ -60,6 +63,8 @@ def test_records_are_those_that_numpy_makes() -> None:
     table["gps_time"] = 7e8 + columns["times"]
     table["range"], table["ring"] = columns["ranges"], columns["ring"]
     table["incidence"] = np.rint(np.degrees(columns["incidence"]) * 8) / 8
+    for name in ("shift", "sigma"):
+        table[name] = np.rint(columns[name] * np.float32(8192)) / np.float32(8192) + np.float32(0)
     assert records(points, columns).tobytes() == table.tobytes()
 
 

@@ -13,7 +13,7 @@ const CHUNK: usize = 8192;
 const SIZE: usize = 30;
 /// Return number 1 in the lower four bits, number of returns 1 in the upper.
 const ONLY_RETURN: u8 = 0x11;
-/// Angles are stored in steps of an eighth of a degree, thicknesses in steps of 1/8192 m: further
+/// Angles are stored in steps of an eighth of a degree, short lengths in steps of 1/8192 m: further
 /// digits mean nothing, and would be most of what a compressed point takes.
 const STEPS_PER_DEGREE: f32 = 8.0;
 const STEPS_PER_METRE: f32 = 8192.0;
@@ -62,6 +62,10 @@ pub struct Columns<'a> {
     pub incidence: Extra<'a, f32>,
     /// Standard deviation across the surface, m.
     pub thickness: Extra<'a, f32>,
+    /// By which the point was moved along its beam, m.
+    pub shift: Extra<'a, f32>,
+    /// Standard deviation along the beam, m.
+    pub sigma: Extra<'a, f32>,
     /// Number of the run, which is the source of a point, too.
     pub run_id: Extra<'a, u16>,
 }
@@ -88,6 +92,8 @@ pub fn records(columns: &Columns<'_>, scaling: &Scaling) -> Result<Vec<u8>, LasE
         (columns.ring.is_stored, 2),
         (columns.incidence.is_stored, 4),
         (columns.thickness.is_stored, 4),
+        (columns.shift.is_stored, 4),
+        (columns.sigma.is_stored, 4),
         (columns.run_id.is_stored, 2),
     ];
     let extra: usize = stored.iter().map(|&(is, n)| if is { n } else { 0 }).sum();
@@ -130,9 +136,11 @@ fn write(c: &Columns<'_>, s: &Scaling, i: usize, row: &mut [u8]) -> Result<(), L
         let degrees = v * (180.0 / PI);
         (whole(degrees * STEPS_PER_DEGREE) / STEPS_PER_DEGREE).to_le_bytes()
     });
-    out.put_extra(&c.thickness, i, |v| {
-        (whole(v * STEPS_PER_METRE) / STEPS_PER_METRE).to_le_bytes()
-    });
+    for lengths in [&c.thickness, &c.shift, &c.sigma] {
+        out.put_extra(lengths, i, |v| {
+            (whole(v * STEPS_PER_METRE) / STEPS_PER_METRE).to_le_bytes()
+        });
+    }
     out.put_extra(&c.run_id, i, u16::to_le_bytes);
     Ok(())
 }
@@ -208,6 +216,8 @@ mod tests {
             ring: none(),
             incidence: none(),
             thickness: none(),
+            shift: none(),
+            sigma: none(),
             run_id: none(),
         }
     }
@@ -233,10 +243,14 @@ mod tests {
                 is_stored: true,
                 values: None,
             },
+            shift: Extra {
+                is_stored: true,
+                values: Some(&[-0.015_625]),
+            },
             ..columns(&points, &times, &ranges)
         };
         let row = records(&all, &SCALING).unwrap();
-        assert_eq!(row.len(), 30 + 4 + 2 + 4 + 4 + 2);
+        assert_eq!(row.len(), 30 + 4 + 2 + 4 + 4 + 4 + 2);
         assert_eq!(row[..4], 10_000_i32.to_le_bytes());
         assert_eq!(row[4..8], (-20_000_i32).to_le_bytes());
         assert_eq!(row[8..12], 0_i32.to_le_bytes()); // half a step goes to the even one
@@ -248,7 +262,8 @@ mod tests {
         assert_eq!(row[34..36], 9_u16.to_le_bytes());
         assert_eq!(row[36..40], 45.0_f32.to_le_bytes());
         assert_eq!(row[40..44], [0; 4]);
-        assert_eq!(row[44..46], 3_u16.to_le_bytes());
+        assert_eq!(row[44..48], (-0.015_625_f32).to_le_bytes());
+        assert_eq!(row[48..50], 3_u16.to_le_bytes());
     }
 
     #[test]

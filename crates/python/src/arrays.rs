@@ -66,6 +66,27 @@ pub(crate) fn finite<'a>(
     }
 }
 
+/// A contiguous array of as many values as `points` has rows.
+pub(crate) fn same<'a, T: numpy::Element>(
+    name: &str,
+    array: &'a PyReadonlyArray1<'_, T>,
+    n: usize,
+) -> PyResult<&'a [T]> {
+    require_rows(name, array.len(), n)?;
+    let not_contiguous = |_| PyValueError::new_err(format!("{name}: expected a contiguous array"));
+    array.as_slice().map_err(not_contiguous)
+}
+
+/// Refuses another number of rows than `points` has.
+pub(crate) fn require_rows(name: &str, found: usize, expected: usize) -> PyResult<()> {
+    if found == expected {
+        return Ok(());
+    }
+    Err(PyValueError::new_err(format!(
+        "{name}: expected {expected} rows as points has, got {found}"
+    )))
+}
+
 /// Encoder angles of the points: needed with a motor, without meaning and optional without one.
 pub(crate) fn angles<'a>(
     array: Option<&'a PyReadonlyArray1<'_, f64>>,

@@ -2,11 +2,11 @@
 //! `_core.MapSurvey` and `_core.MapCells`: what the points of a map say about each other.
 
 use bentwing_cells::{Cells, Settings, Survey};
-use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
+use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 
-use crate::arrays::{finite, finite_number, finite_rows, rows};
+use crate::arrays::{finite, finite_number, finite_rows, require_rows, rows, same};
 use crate::errors::in_pool;
 
 type DescribedArrays<'py> = (
@@ -130,25 +130,6 @@ impl MapCells {
             found.is_supported.into_pyarray(py),
         ))
     }
-}
-
-fn same<'a, T: numpy::Element>(
-    name: &str,
-    array: &'a PyReadonlyArray1<'_, T>,
-    n: usize,
-) -> PyResult<&'a [T]> {
-    require_rows(name, array.len(), n)?;
-    let not_contiguous = |_| PyValueError::new_err(format!("{name}: expected a contiguous array"));
-    array.as_slice().map_err(not_contiguous)
-}
-
-fn require_rows(name: &str, found: usize, expected: usize) -> PyResult<()> {
-    if found == expected {
-        return Ok(());
-    }
-    Err(PyValueError::new_err(format!(
-        "{name}: expected {expected} rows as points has, got {found}"
-    )))
 }
 
 fn finished() -> PyErr {

@@ -17,7 +17,8 @@ type Column<'py, T> = Option<PyReadonlyArray1<'py, T>>;
 #[pyfunction]
 #[allow(clippy::too_many_arguments, reason = "arrays by name in Python")]
 #[pyo3(signature = (
-    points, *, times, ranges, intensity, ring, incidence, thickness, run_id, stored, offsets, step,
+    points, *, times, ranges, intensity, ring, incidence, thickness, shift, sigma, run_id,
+    stored, offsets, step,
     gps_origin, intensity_scale, threads = 0
 ))]
 pub(crate) fn las_records<'py>(
@@ -29,6 +30,8 @@ pub(crate) fn las_records<'py>(
     ring: Column<'py, u16>,
     incidence: Column<'py, f32>,
     thickness: Column<'py, f32>,
+    shift: Column<'py, f32>,
+    sigma: Column<'py, f32>,
     run_id: Column<'py, u16>,
     stored: Vec<String>,
     offsets: [f64; 3],
@@ -48,6 +51,8 @@ pub(crate) fn las_records<'py>(
         ring: extra("ring", ring.as_ref(), n, &stored)?,
         incidence: extra("incidence", incidence.as_ref(), n, &stored)?,
         thickness: extra("thickness", thickness.as_ref(), n, &stored)?,
+        shift: extra("shift", shift.as_ref(), n, &stored)?,
+        sigma: extra("sigma", sigma.as_ref(), n, &stored)?,
         run_id: extra("run_id", run_id.as_ref(), n, &stored)?,
     };
     let scaling = Scaling {

@@ -19,6 +19,7 @@ mod laz;
 mod ndt;
 mod pose_graph;
 mod raycast;
+mod refinement;
 mod registration;
 mod surfels;
 mod trajectory;
@@ -46,6 +47,8 @@ mod _core {
     use crate::pose_graph::{PoseGraphSolution, solve_pose_graph};
     #[pymodule_export]
     use crate::raycast::Scene;
+    #[pymodule_export]
+    use crate::refinement::{RangeNoise, SurfaceSample, Surfaces};
     #[pymodule_export]
     use crate::registration::{FixedView, Registration, register_window};
     #[pymodule_export]

@@ -117,6 +117,15 @@ def command(
             help="Whether to keep returns between two surfaces.",
         ),
     ] = None,
+    refine: Annotated[
+        bool | None,
+        option(
+            MAP,
+            "--refine/--no-refine",
+            show_default="as in the map",
+            help="Whether to move points to the surface that they measured together.",
+        ),
+    ] = None,
     epsg: Annotated[
         int | None,
         option(
@@ -150,6 +159,7 @@ def command(
         polygon=polygon,
         keep_moving=keep_moving,
         keep_mixed=keep_mixed,
+        refine=refine,
         epsg=epsg,
         local=local,
         tiles=tiles,

@@ -30,6 +30,7 @@ def command(
     map_spacing: options.Spacing = None,
     keep_moving: options.KeepMoving = False,
     keep_mixed: options.KeepMixed = False,
+    no_refine: options.NoRefine = False,
     georeference: options.Georeference = None,
     epsg: options.Epsg = None,
     control_points: options.ControlPoints = None,
@@ -59,6 +60,7 @@ def command(
         ),
         cleaning=CleanSettings(**options.cleaning(keep_mixed=keep_mixed, keep_moving=keep_moving)),
         project=project,
+        refine=not no_refine,
         threads=threads,
         progress=create_progress(quiet=quiet),
     )

@@ -140,6 +140,15 @@ KeepMoving = Annotated[
         help="Keep points that beams went through at other times or in other runs.",
     ),
 ]
+NoRefine = Annotated[
+    bool,
+    option(
+        MAP,
+        "--no-refine",
+        help="Leave points where they were measured, rather than on the surface that they measured "
+        "together.",
+    ),
+]
 KeepMixed = Annotated[bool, option(MAP, "--keep-mixed", help="Keep returns between two surfaces.")]
 
 Georeference = Annotated[

@@ -30,6 +30,9 @@ class MapChunk:
     incidence : (N,) float32 or None, rad, between beam and normal; NaN where there is no surface
     thickness : (N,) float32 or None, m, standard deviation of the points around across the
         surface; NaN where there is none
+    shift : (N,) float32 or None, m, by how much the point was moved along its beam, away from the
+        lidar; the range is as it was measured
+    sigma : (N,) float32 or None, m, standard deviation along the beam; NaN where it is not known
     run_id : (N,) uint16 or None, of a map of several runs, which of them
     """
 
@@ -42,10 +45,19 @@ class MapChunk:
     doubtful: NDArray[np.bool_] | None = None
     incidence: NDArray[np.float32] | None = None
     thickness: NDArray[np.float32] | None = None
+    shift: NDArray[np.float32] | None = None
+    sigma: NDArray[np.float32] | None = None
     run_id: NDArray[np.uint16] | None = None
 
     def __len__(self) -> int:
         return len(self.times)
+
+    @property
+    def measured(self) -> NDArray[np.float64]:
+        """Where the points were before they were moved, (N, 3) float64, m."""
+        if self.shift is None or self.beams is None:
+            return self.points
+        return self.points - self.beams * self.shift[:, None].astype(np.float64)
 
     def where(self, keep: NDArray[np.bool_] | slice) -> MapChunk:
         """Return the points selected by a mask or a slice."""

@@ -20,6 +20,8 @@ _OPTIONAL = {
     "ring": "<u2",
     "incidence": "<f4",
     "thickness": "<f4",
+    "shift": "<f4",
+    "sigma": "<f4",
     "run_id": "<u2",
 }
 

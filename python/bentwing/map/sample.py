@@ -16,7 +16,9 @@ if TYPE_CHECKING:
 
 
 class MapSample:
-    """Every k-th point of what passes by, k doubled whenever more than `limit` were kept.
+    """Every k-th point of what passes by, as measured, k doubled whenever more than `limit` were kept.
+
+    By the points as they were measured the trajectory is judged; refined ones would flatter it.
 
     Parameters
     ----------
@@ -50,7 +52,7 @@ class MapSample:
     def add(self, chunk: MapChunk) -> None:
         """Take the share of a chunk that belongs to the sample."""
         chosen = slice(self._next, None, self._step)
-        taken = chunk.points[chosen]
+        taken = chunk.measured[chosen]
         self._next += len(taken) * self._step - len(chunk)
         self._points.append(taken.copy())
         self._times.append(chunk.times[chosen].copy())

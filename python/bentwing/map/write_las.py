@@ -28,6 +28,8 @@ EXTRA: dict[str, tuple[type[np.generic], str]] = {
     "ring": (np.uint16, "beam number"),
     "incidence": (np.float32, "deg between beam and normal"),
     "thickness": (np.float32, "m, 1 sigma across the surface"),
+    "shift": (np.float32, "m moved along the beam"),
+    "sigma": (np.float32, "m, 1 sigma along the beam"),
     "run_id": (np.uint16, "number of the run"),
 }
 # What the records are made of beside the points.

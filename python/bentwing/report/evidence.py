@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from bentwing.evaluate.thickness import wall_thickness
 from bentwing.report.loops import consistency_table, revisits_table
 from bentwing.report.scene import scene
-from bentwing.report.sections import figure
+from bentwing.report.sections import figure, refinement_sentence
 from bentwing.report.views import SLAB
 
 if TYPE_CHECKING:
@@ -41,7 +41,8 @@ def map_section(drawn: Drawn) -> str:
         figure(views.side, texts.side, texts.side_note, wide=True),
         figure(views.section, texts.section, texts.section_note.format(slab=SLAB), wide=True),
     ]
-    return f'<h2>{escape(texts.map)}</h2><div class="grid">{"".join(figures)}</div>'
+    said = refinement_sentence((record.get("map") or {}).get("refinement"), texts)
+    return f'<h2>{escape(texts.map)}</h2>{said}<div class="grid">{"".join(figures)}</div>'
 
 
 def coverage_section(drawn: Drawn) -> str:

@@ -127,6 +127,17 @@ def tiles(
     return f'<div class="tiles">{"".join(cells)}</div>'
 
 
+def refinement_sentence(found: Mapping[str, Any] | None, texts: Texts) -> str:
+    """Say how many points were moved along their beams, by how much, and what is left."""
+    if found is None:
+        return ""
+    if not found.get("moved"):
+        return f"<p>{escape(texts.nothing_refined)}</p>"
+    move, before, after = (1000 * found[name] for name in ("move", "sigma_before", "sigma"))
+    said = texts.refined.format(share=found["moved"], move=move, before=before, after=after)
+    return f"<p>{escape(said)}</p>"
+
+
 def _parts(trajectory: Trajectory) -> list[Trajectory]:
     """Return the trajectories of runs that were joined one after the other, with a pause between."""
     cuts = [0, *(np.flatnonzero(np.diff(trajectory.times) > _PAUSE) + 1), len(trajectory.times)]

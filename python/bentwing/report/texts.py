@@ -93,6 +93,13 @@ class Texts:
     map: str = "Map"
     no_points: str = "No points were mapped."
     no_map: str = "No map was asked for."
+    nothing_refined: str = "No point was moved: there is no surface that enough passes have seen."
+    refined: str = (
+        "{share:.0%} of the points were moved along their beams to the surface that they measured "
+        "together, by {move:.1f} mm in the median; one standard deviation along the beam was "
+        "{before:.1f} mm and is {after:.1f} mm. The pictures and the accuracy below show the points "
+        "as measured."
+    )
     oblique: str = "Oblique view"
     oblique_note: str = "coloured by height"
     by_time: str = "Plan by time"

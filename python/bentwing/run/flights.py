@@ -62,6 +62,7 @@ def map_flights(
         map_format=settings.map_format,
         map_spacing=settings.map_spacing,
         cleaning=settings.cleaning,
+        refine=settings.refine,
         georeferencing=settings.georeferencing,
         project=settings.project,
         threads=settings.threads,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""Writes the map of one run or of several: project, clean, thin, write."""
+"""Writes the map of one run or of several: project, clean, refine, thin, write."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from bentwing.base.trajectory import Trajectory
 from bentwing.evaluate.revisits import revisit_consistency
 from bentwing.map.chunk import untimed
 from bentwing.map.clean import clean
+from bentwing.map.refine import refine
 from bentwing.map.sample import MapSample
 from bentwing.map.thin import thin
 from bentwing.map.writer import open_map
@@ -91,6 +92,12 @@ def write_map(
     )
     if difference is not None:
         chunks = difference.watch(chunks)
+    if settings.refine:
+        refined: dict[str, Any] = {}
+        record["refinement"] = refined
+        chunks = refine(
+            chunks, folder.path, counts=counts, record=refined, threads=settings.threads
+        )
     kept = sample.watch(thin(chunks, settings.map_spacing, counts))
     with (
         closing(read_ahead(kept, _CHUNKS_AHEAD)) as ahead,

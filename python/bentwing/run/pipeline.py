@@ -46,6 +46,7 @@ def map_recording(
     map_format: MapFormat | None = None,
     map_spacing: float | None = None,
     cleaning: CleanSettings | None = None,
+    refine: bool = True,
     georeferencing: GeoreferenceSettings | None = None,
     project: Project | Path | str | None = None,
     loop_closure: bool = True,
@@ -71,6 +72,7 @@ def map_recording(
     map_format : one of `MAP_FORMATS`; default: `laz`
     map_spacing : m, edge of the voxels that keep one point each; default: 0, which keeps all points
     cleaning : what the map leaves out; default: mixed pixels and what moved
+    refine : whether points are moved along their beams to the surface that they measured together
     georeferencing : how GNSS fixes and control points are used; default: fixes, where the payload
         names their topic, as a rigid fit
     project : what the first page of the report names, or a YAML file of it; default: the payload's
@@ -99,6 +101,7 @@ def map_recording(
         map_format=map_format,
         map_spacing=map_spacing,
         cleaning=cleaning,
+        refine=None if refine else False,
         georeferencing=georeferencing,
         project=as_project(project),
         loop_closure=None if loop_closure else False,

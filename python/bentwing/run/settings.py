@@ -50,6 +50,11 @@ class MapSettings(Settings):
         description="edge of the voxels that keep one point each; 0 keeps all points",
     )
     cleaning: CleanSettings = Field(default=CleanSettings(), description="what the map leaves out")
+    refine: bool = Field(
+        default=True,
+        description="whether points are moved along their beams to the surface that they measured "
+        "together; turn off for the returns as they are",
+    )
     georeferencing: GeoreferenceSettings = Field(
         default=GeoreferenceSettings(), description="how GNSS fixes and control points are used"
     )

@@ -232,6 +232,8 @@ def full(n, seed=0, shift=(0.0, 0.0, 0.0)):
         points=part.points + shift,
         incidence=rng.uniform(0, 1.5, n).astype(np.float32),
         thickness=rng.uniform(0, 0.05, n).astype(np.float32),
+        shift=rng.uniform(-0.03, 0.03, n).astype(np.float32),
+        sigma=rng.uniform(0, 0.01, n).astype(np.float32),
         run_id=np.full(n, 3, np.uint16),
     )
 
@@ -244,13 +246,14 @@ def utm():
     return ProjectedSystem.of_epsg(32632)
 
 
-def test_laz_carries_incidence_thickness_and_run(tmp_path):
+def test_laz_carries_all_that_is_known_of_a_point(tmp_path):
     part = full(500)
     las = laspy.read(written(tmp_path / "map.laz", "laz", part))
-    names = ["range", "ring", "incidence", "thickness", "run_id"]
+    names = ["range", "ring", "incidence", "thickness", "shift", "sigma", "run_id"]
     assert list(las.point_format.extra_dimension_names) == names
     assert np.abs(las["incidence"] - np.degrees(part.incidence)).max() <= 1 / 16 + 1e-4
-    assert np.abs(las["thickness"] - part.thickness).max() <= 1 / 16384 + 1e-7
+    for name in ("thickness", "shift", "sigma"):
+        assert np.abs(las[name] - getattr(part, name)).max() <= 1 / 16384 + 1e-7
     assert (las["run_id"] == 3).all()
     assert (las.point_source_id == 3).all()
 
@@ -268,11 +271,13 @@ def test_rows_have_incidence_in_degrees(tmp_path, kind):
     xyz = "<f8" if kind == "ply" else "<f4"
     row = np.dtype(
         [("xyz", xyz, 3), ("t", "<f8"), ("range", "<f4"), ("intensity", "<f4"), ("ring", "<u2"),
-         ("incidence", "<f4"), ("thickness", "<f4"), ("run_id", "<u2")]
+         ("incidence", "<f4"), ("thickness", "<f4"), ("shift", "<f4"), ("sigma", "<f4"),
+         ("run_id", "<u2")]
     )  # fmt: skip
     table = np.frombuffer(data[-10 * row.itemsize :], row)
     assert np.allclose(table["incidence"], np.degrees(part.incidence))
-    assert np.array_equal(table["thickness"], part.thickness)
+    for name in ("thickness", "shift", "sigma"):
+        assert np.array_equal(table[name], getattr(part, name))
     assert (table["run_id"] == 3).all()
 
 

@@ -10,15 +10,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import laspy
 import numpy as np
 
-from bentwing.base import geometry
 from bentwing.base.calibration import Calibration
-from bentwing.base.mount import FixedMount
 from bentwing.base.run_record import read_record
 from bentwing.base.trajectory import Trajectory, read_tum
 from bentwing.evaluate.alignment import align, associate
+from bentwing.evaluate.simulated.measured import measured_points, path_of_lidar
 from bentwing.evaluate.simulated.truth import sampled
 
 if TYPE_CHECKING:
@@ -72,8 +70,8 @@ def world_error(truth: Truth, run: Path, *, any_clock: bool = False) -> WorldErr
     """
     calibration = Calibration.from_json(read_record(run)["calibration"])
     estimate, _ = read_tum(run / "trajectory.txt", truth.origin_ns)
-    found = _of_lidar(estimate, calibration)
-    true = _of_lidar(truth.trajectory, truth.calibration)
+    found = path_of_lidar(estimate, calibration)
+    true = path_of_lidar(truth.trajectory, truth.calibration)
     clock = _offset(found, true, truth.flight) if any_clock else 0.0
     ours, theirs = associate(_shifted(found, clock), true, truth.flight)
     alignment = align(ours.positions, theirs.positions)
@@ -87,16 +85,6 @@ def world_error(truth: Truth, run: Path, *, any_clock: bool = False) -> WorldErr
         clock=clock,
         covered=len(ours) / n_flown,
     )
-
-
-def _of_lidar(trajectory: Trajectory, calibration: Calibration) -> Trajectory:
-    """Return the path of the lidar; of a turned one that of its place at the encoder's zero."""
-    mount = calibration.mount
-    pose = mount.T_imu_lidar if isinstance(mount, FixedMount) else mount.lidar_at(0.0)
-    places = geometry.compose(
-        trajectory.positions, trajectory.quats_xyzw, np.tile(pose.translation, (len(trajectory), 1))
-    )
-    return Trajectory(trajectory.times, places, trajectory.quats_xyzw)
 
 
 def _shifted(trajectory: Trajectory, seconds: float) -> Trajectory:
@@ -127,13 +115,12 @@ def _offset(found: Trajectory, true: Trajectory, flight: tuple[float, float]) ->
 
 
 def _flown(run: Path, truth: Truth, alignment: Alignment) -> Array:
-    """Return some points (N, 3) of the map that were measured in flight, in the world.
+    """Return some points (N, 3) that were measured in flight, as measured, in the world.
 
     The flight is the same share of the map's time as of the truth's, on whatever clock.
     """
-    table = laspy.read(run / "map.laz")
-    times = np.asarray(table.gps_time)
+    points, times = measured_points(run / "map.laz", truth.origin_ns)
     first, last = times.min(), times.max()
     begin, end = np.array(truth.flight) / truth.trajectory.times[-1]
     at = (times - first) / max(last - first, 1e-9)
-    return alignment.put(sampled(np.asarray(table.xyz)[(at >= begin) & (at <= end)]))
+    return alignment.put(sampled(points[(at >= begin) & (at <= end)]))

@@ -8,7 +8,6 @@ from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
-import laspy
 import numpy as np
 import yaml
 
@@ -18,7 +17,7 @@ from bentwing.base.errors import InputError
 from bentwing.base.mount import mount_from_json
 from bentwing.base.trajectory import Trajectory, read_tum
 from bentwing.evaluate.map import SurfaceError, surface_error
-from bentwing.map.gps_time import adjusted_gps_origin
+from bentwing.evaluate.simulated.measured import measured_points
 from bentwing.map.project import placed_points
 from bentwing.map.read_mesh import read_mesh
 from bentwing.recording import LidarBatch, Payload, Recording
@@ -153,16 +152,15 @@ def true_calibration(folder: Path, biases: Literal["start", "end"] = "end") -> C
 
 
 def mapped_points(path: Path, origin_ns: int, flight: tuple[float, float]) -> Array:
-    """Read some points (N, 3), m, of a LAZ map that were measured in flight.
+    """Read some points (N, 3), m, of the LAZ map of a run that were measured in flight, as measured.
 
     Parameters
     ----------
     origin_ns : epoch of the times of `flight`
     flight : s, first and last time
     """
-    table = laspy.read(path)
-    times = table.gps_time - adjusted_gps_origin(origin_ns)
-    return sampled(table.xyz[(times >= flight[0]) & (times <= flight[1])])
+    points, times = measured_points(path, origin_ns)
+    return sampled(points[(times >= flight[0]) & (times <= flight[1])])
 
 
 def sampled(points: Array) -> Array:

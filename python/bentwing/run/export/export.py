@@ -77,6 +77,7 @@ def export(
     polygon: Path | str | None = None,
     keep_moving: bool | None = None,
     keep_mixed: bool | None = None,
+    refine: bool | None = None,
     epsg: int | None = None,
     local: bool = False,
     tiles: int | None = None,
@@ -100,6 +101,7 @@ def export(
     polygon : GeoJSON or DXF file with areas, inside of which points are kept
     keep_moving : keep points that beams went through at other times; default: as the map does
     keep_mixed : keep returns between two surfaces; default: as the map does
+    refine : move points along their beams to the surface that they measured together; default: as the map
     epsg : projected system of the coordinates; default: that of the map
     local : write coordinates in the frame of the trajectory
     tiles : m, edge of square tiles, a file each; default: one file
@@ -117,7 +119,7 @@ def export(
     """
     out, shown = Path(path), as_progress(progress)
     thread_count(threads)
-    wish = Wish(spacing, _crop(crop), _path(polygon), keep_moving, keep_mixed, epsg, local)
+    wish = Wish(spacing, _crop(crop), _path(polygon), keep_moving, keep_mixed, refine, epsg, local)
     kind = None if map_format is not None else format_of(out, trajectory_format)
     if trajectory_format is not None and map_format is not None:
         msg = f"a trajectory ({trajectory_format}) and a map ({map_format}) are two files; export twice"
@@ -168,6 +170,7 @@ def export_points(
     polygon: Path | str | None = None,
     keep_moving: bool | None = None,
     keep_mixed: bool | None = None,
+    refine: bool | None = None,
     epsg: int | None = None,
     local: bool = False,
     threads: int | None = None,
@@ -181,7 +184,7 @@ def export_points(
         At once, as `export`; an empty result is no error.
     """
     thread_count(threads)
-    wish = Wish(spacing, _crop(crop), _path(polygon), keep_moving, keep_mixed, epsg, local)
+    wish = Wish(spacing, _crop(crop), _path(polygon), keep_moving, keep_mixed, refine, epsg, local)
     points = Points.of(Finished.open(run), wish)
     return points.chunks(Path(gettempdir()), threads=threads, progress=progress)
 

@@ -110,6 +110,11 @@ class Finished:
             raise InputError(msg) from error
 
     @property
+    def refines(self) -> bool:
+        """Whether the map's points are moved to the surface that they measured together."""
+        return bool(self.record["settings"].get("refine"))
+
+    @property
     def map_name(self) -> str | None:
         """Name of the map's file; None for a run without one."""
         return next((name for name in self.record["files"] if name.startswith("map.")), None)

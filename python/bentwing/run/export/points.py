@@ -13,6 +13,7 @@ from bentwing.base.errors import BentwingError, UsageError
 from bentwing.base.progress import as_progress
 from bentwing.map.clean import clean
 from bentwing.map.crop import Crop, Cropper
+from bentwing.map.refine import refine
 from bentwing.map.thin import thin
 from bentwing.run.export.area import area_in
 from bentwing.run.export.coordinates import same
@@ -41,6 +42,7 @@ class Wish:
     spacing : m, edge of the voxels that keep one point each; 0 for all points; None for those of the map
     crop : what is kept, in the coordinates of the export
     keep_moving, keep_mixed : whether such points are kept; None for what the map does
+    refine : whether points are moved to the surface that they measured together; None for what the map does
     polygon : file of areas, inside of which points are kept beside what the crop says
     epsg : projected system; None for the coordinates of the map
     local : whether coordinates are in the frame of the trajectory
@@ -51,6 +53,7 @@ class Wish:
     polygon: Path | None = None
     keep_moving: bool | None = None
     keep_mixed: bool | None = None
+    refine: bool | None = None
     epsg: int | None = None
     local: bool = False
 
@@ -71,6 +74,10 @@ class Wish:
         kept = {"moving": self.keep_moving, "mixed_pixels": self.keep_mixed}
         changed = {name: not keep for name, keep in kept.items() if keep is not None}
         return of_map.model_copy(update=changed)
+
+    def refines(self, run: Finished) -> bool:
+        """Whether points are refined, where those of the run's map may be."""
+        return run.refines if self.refine is None else self.refine
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,6 +186,8 @@ def _why_again(run: Finished, wish: Wish, stored: MapFile | None) -> str | None:
         return f"its map has one point in {run.spacing:g} m only"
     if wish.cleaning(run.cleaning) != run.cleaning:
         return "its map was cleaned otherwise"
+    if wish.refines(run) != run.refines:
+        return f"its map is {'' if run.refines else 'not '}refined"
     return None
 
 
@@ -226,14 +235,17 @@ def _again(  # noqa: PLR0917 - private, called once
     """Read the recordings with the trajectories of the map, and clean their points."""
     points = [s.points(s.estimate, threads=threads, progress=progress) for s in sources]
     _, late = clock_of(points)
-    for chunk in clean(
+    cleaned: Iterator[MapChunk] = clean(
         in_turn(points, counts),
         folder,
         duration=_duration(sources),
         settings=wish.cleaning(run.cleaning),
         counts=counts,
         threads=threads,
-    ):
+    )
+    if wish.refines(run):
+        cleaned = refine(cleaned, folder, counts=counts, threads=threads)
+    for chunk in cleaned:
         yield with_own_times(chunk, late)
 
 

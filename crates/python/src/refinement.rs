@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! `_core.SurfaceSample` and `_core.Surfaces`: where along its beam each point of a map most probably is.
+
+use bentwing_refinement::{Noise, Sample, Settings, Surfaces as Found};
+use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
+use pyo3::exceptions::{PyRuntimeError, PyValueError};
+use pyo3::prelude::*;
+
+use crate::arrays::{finite, finite_number, finite_rows, require_rows, rows, same};
+use crate::errors::in_pool;
+
+/// How noisy the ranges of a map are, as its smooth surfaces show it.
+#[pyclass(frozen, module = "bentwing._core")]
+pub(crate) struct RangeNoise(Noise);
+
+#[pymethods]
+impl RangeNoise {
+    /// Standard deviations of ranges, m.
+    fn sigmas<'py>(
+        &self,
+        py: Python<'py>,
+        ranges: PyReadonlyArray1<'_, f32>,
+    ) -> PyResult<Bound<'py, PyArray1<f32>>> {
+        let ranges = same("ranges", &ranges, ranges.len())?;
+        let sigmas: Vec<f32> = ranges.iter().map(|&r| self.0.sigma(r) as f32).collect();
+        Ok(sigmas.into_pyarray(py))
+    }
+}
+
+/// Takes the points of a part of a map.
+#[pyclass(module = "bentwing._core")]
+pub(crate) struct SurfaceSample(Option<Sample>);
+
+#[pymethods]
+impl SurfaceSample {
+    #[new]
+    #[pyo3(signature = (*, edge, n_levels, enough, fewest_passes, most_noise, pass_length))]
+    fn new(
+        edge: f64,
+        n_levels: u32,
+        enough: usize,
+        fewest_passes: f64,
+        most_noise: f64,
+        pass_length: f64,
+    ) -> PyResult<Self> {
+        for (name, value) in [("edge", edge), ("pass_length", pass_length)] {
+            if finite_number(name, value)? <= 0.0 {
+                let message = format!("{name}: expected a positive number, got {value}");
+                return Err(PyValueError::new_err(message));
+            }
+        }
+        Ok(Self(Some(Sample::new(Settings {
+            edge,
+            n_levels: n_levels.clamp(1, 8),
+            enough: enough.max(1),
+            fewest_passes: finite_number("fewest_passes", fewest_passes)?,
+            most_noise: finite_number("most_noise", most_noise)?,
+            pass: pass_length,
+        }))))
+    }
+
+    /// Adds points with the unit directions, lengths and times of their beams.
+    #[pyo3(signature = (points, *, beams, ranges, times))]
+    fn add(
+        &mut self,
+        py: Python<'_>,
+        points: PyReadonlyArray2<'_, f64>,
+        beams: PyReadonlyArray2<'_, f32>,
+        ranges: PyReadonlyArray1<'_, f32>,
+        times: PyReadonlyArray1<'_, f64>,
+    ) -> PyResult<()> {
+        let points = finite_rows("points", &points)?;
+        let n = points.len();
+        let (beams, ranges) = (rows("beams", &beams)?, same("ranges", &ranges, n)?);
+        require_rows("beams", beams.len(), n)?;
+        let times = finite("times", &times, n)?;
+        let sample = self.0.as_mut().ok_or_else(used)?;
+        crate::errors::detached(py, || sample.add(points, beams, ranges, times));
+        Ok(())
+    }
+
+    /// The surfaces, for the noise of the ranges or else that which smooth surfaces show; None without
+    /// such; ends the sample.
+    #[pyo3(signature = (*, noise=None, threads=0))]
+    fn fit(
+        &mut self,
+        py: Python<'_>,
+        noise: Option<&RangeNoise>,
+        threads: usize,
+    ) -> PyResult<Option<Surfaces>> {
+        let sample = self.0.take().ok_or_else(used)?;
+        let known = noise.map(|n| n.0.clone());
+        in_pool(py, threads, || sample.fit(known).map(Surfaces))
+    }
+}
+
+/// Surfaces of a part of a map.
+#[pyclass(frozen, module = "bentwing._core")]
+pub(crate) struct Surfaces(Found);
+
+#[pymethods]
+impl Surfaces {
+    /// The noise of the ranges.
+    #[getter]
+    fn noise(&self) -> RangeNoise {
+        RangeNoise(self.0.noise().clone())
+    }
+
+    /// Moves along the beams (m, away from the lidar; 0 where a point stays), and the standard
+    /// deviations that are left (m).
+    #[pyo3(signature = (points, *, beams, ranges, threads=0))]
+    fn refine<'py>(
+        &self,
+        py: Python<'py>,
+        points: PyReadonlyArray2<'py, f64>,
+        beams: PyReadonlyArray2<'py, f32>,
+        ranges: PyReadonlyArray1<'py, f32>,
+        threads: usize,
+    ) -> PyResult<(Bound<'py, PyArray1<f32>>, Bound<'py, PyArray1<f32>>)> {
+        let points = finite_rows("points", &points)?;
+        let (beams, ranges) = (
+            rows("beams", &beams)?,
+            same("ranges", &ranges, points.len())?,
+        );
+        require_rows("beams", beams.len(), points.len())?;
+        let found = in_pool(py, threads, || self.0.refine(points, beams, ranges))?;
+        Ok((found.moves.into_pyarray(py), found.sigmas.into_pyarray(py)))
+    }
+}
+
+fn used() -> PyErr {
+    PyRuntimeError::new_err("the sample is used up")
+}

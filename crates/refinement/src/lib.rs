@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+#![doc = include_str!("../README.md")]
+#![forbid(unsafe_code)]
+
+mod grid;
+mod noise;
+mod piece;
+mod refine;
+mod sample;
+mod sheet;
+mod split;
+mod surfaces;
+
+pub use noise::Noise;
+pub use refine::Refined;
+pub use sample::{Sample, Settings};
+pub use surfaces::Surfaces;

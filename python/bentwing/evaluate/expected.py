@@ -52,7 +52,7 @@ class ExpectedAccuracy:
         )
         if self.map_thickness is None:
             return f"{said}."
-        return f"{said}; surfaces in the map scatter by {1e3 * self.map_thickness:.0f} mm."
+        return f"{said}; surfaces as measured scatter by {1e3 * self.map_thickness:.0f} mm."
 
 
 def expected_accuracy(

@@ -331,7 +331,7 @@ def test_without_a_map_the_run_ends_with_its_trajectory_and_says_so(tmp_path, re
     page = run.report_path.read_text()
     assert "No map was asked for" in page
     assert "Expected accuracy" in page
-    assert "surfaces in the map scatter" not in page
+    assert "surfaces as measured scatter" not in page
     assert run.map_path is Run.load(run.out).map_path is None
 
 

@@ -73,7 +73,7 @@ def test_the_start_of_a_good_flight_is_a_note_and_no_warning(mapped):
     assert record["verdict"]["state"] == "good"
     assert record["verdict"]["reasons"] == []
     assert "Good: all that was checked agrees" in page
-    assert f"Note: {note}." in page
+    assert f"{note[0].upper()}{note[1:]}." in page
 
 
 def test_the_report_stands_alone(mapped):

@@ -58,6 +58,20 @@ def test_nothing_lies_on_a_floor(bentwing, finished, tmp_path):
     assert bentwing("volume", finished, "--area", area).out.endswith("is counted\n")
 
 
+def test_a_mesh_is_written_and_the_result_said(bentwing, finished, tmp_path):
+    pytest.importorskip("open3d", reason="Open3D is not installed", exc_type=ImportError)
+    done = bentwing("mesh", finished, "--spacing", "0.2", "-o", tmp_path / "mesh.ply")
+    assert done.code == 0, done.err
+    assert "points 20 cm apart" in done.out
+    assert (tmp_path / "mesh.ply").read_bytes().startswith(b"ply\n")
+
+
+def test_a_mesh_of_another_kind_is_refused(bentwing, finished, tmp_path):
+    done = bentwing("mesh", finished, "-o", tmp_path / "mesh.stl")
+    assert done.code == 2
+    assert "must end with .ply or .obj or .glb" in done.err
+
+
 @pytest.mark.parametrize(
     ("arguments", "code", "said"),
     [

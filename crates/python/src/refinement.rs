@@ -9,6 +9,9 @@ use pyo3::prelude::*;
 use crate::arrays::{finite, finite_number, finite_rows, require_rows, rows, same};
 use crate::errors::in_pool;
 
+/// Two columns of numbers.
+type Columns<'py> = (Bound<'py, PyArray1<f32>>, Bound<'py, PyArray1<f32>>);
+
 /// How noisy the ranges of a map are, as its smooth surfaces show it.
 #[pyclass(frozen, module = "bentwing._core")]
 pub(crate) struct RangeNoise(Noise);
@@ -116,7 +119,7 @@ impl Surfaces {
         beams: PyReadonlyArray2<'py, f32>,
         ranges: PyReadonlyArray1<'py, f32>,
         threads: usize,
-    ) -> PyResult<(Bound<'py, PyArray1<f32>>, Bound<'py, PyArray1<f32>>)> {
+    ) -> PyResult<Columns<'py>> {
         let points = finite_rows("points", &points)?;
         let (beams, ranges) = (
             rows("beams", &beams)?,

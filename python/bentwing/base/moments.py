@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing.base.voxels import by_key, cells_of, centres_of, pack, unpack
+from bentwing.base.key_sums import KeySums
+from bentwing.base.voxels import cells_of, centres_of, pack, unpack
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -88,8 +89,6 @@ class Planes:
 class VoxelMoments:
     """Moments of the points in every voxel, of a cloud that is never in memory as a whole.
 
-    Sums per voxel, in sorted runs that are merged whenever a newer one has half an older's size.
-
     Parameters
     ----------
     edge : m, of the voxels
@@ -97,7 +96,7 @@ class VoxelMoments:
 
     def __init__(self, edge: float) -> None:
         self._edge = edge
-        self._runs: list[tuple[NDArray[np.int64], NDArray[np.float64]]] = []
+        self._sums = KeySums()
 
     def add(self, points: NDArray[np.float64]) -> None:
         """Add points (N, 3) m."""
@@ -120,28 +119,17 @@ class VoxelMoments:
         # relative to the centres of the voxels, so that squares keep their precision
         local = means - centres_of(cells, self._edge)
         squares = spread + local[:, _ROWS] * local[:, _COLUMNS]
-        run = _summed(pack(cells), np.hstack([n, n * local, n * squares]))
-        while self._runs and len(self._runs[-1][0]) <= 2 * len(run[0]):
-            older = self._runs.pop()
-            run = _summed(*(np.concatenate(pair) for pair in zip(older, run, strict=True)))
-        self._runs.append(run)
+        self._sums.add(pack(cells), np.hstack([n, n * local, n * squares]))
 
     def result(self) -> Moments:
         """Return the moments of the voxels in the order of their keys."""
-        if not self._runs:
+        if not len(self._sums):
             return Moments(np.empty(0, np.int64), np.empty((0, 3)), np.empty((0, 3, 3)))
-        keys, sums = _summed(*(np.concatenate(column) for column in zip(*self._runs, strict=True)))
+        keys, sums = self._sums.result()
         n, local = sums[:, :1], sums[:, 1:4] / sums[:, :1]
         covariances = _symmetric((sums[:, 4:] / n).T) - local[:, :, None] * local[:, None, :]
         centres = centres_of(unpack(keys), self._edge)
         return Moments(n[:, 0].astype(np.int64), centres + local, covariances)
-
-
-def _summed(
-    keys: NDArray[np.int64], sums: NDArray[np.float64]
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    order, starts = by_key(keys)
-    return keys[order][starts], np.add.reduceat(sums[order], starts)
 
 
 def _symmetric(six: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -27,6 +27,7 @@ COMMANDS = {
     "section": "Draw a plan or section of a map, with its walls.",
     "terrain": "Find the ground: heights, contours, classes of points.",
     "volume": "Measure a volume over an area, with its uncertainty.",
+    "mesh": "Fit triangles to the points of a map.",
     "view": "Show a run: map, path and windows over time.",
     "simulate": "Simulate a recording with truth.",
     "reproduce": "Make a paper's figures and tables again.",

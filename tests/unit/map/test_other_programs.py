@@ -96,7 +96,7 @@ def test_laszip_agrees_on_every_point(tmp_path, part, kind):
 
 @pytest.mark.parametrize("kind", ["ply", "pcd"])
 def test_open3d_agrees_on_count_and_bounds(tmp_path, part, kind):
-    o3d = pytest.importorskip("open3d", reason="Open3D cannot be imported", exc_type=ImportError)
+    o3d = pytest.importorskip("open3d", reason="Open3D is not installed", exc_type=ImportError)
     path = write(tmp_path / f"map.{kind}", part)
     cloud = o3d.t.io.read_point_cloud(str(path))
     points = cloud.point.positions.numpy().astype(np.float64)

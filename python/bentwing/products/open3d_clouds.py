@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""Maps, points and trajectories as tensors of Open3D, and back."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bentwing.base.errors import UsageError
+from bentwing.base.trajectory import Trajectory
+from bentwing.map.chunk import MapChunk
+from bentwing.products.finished_map import open_map_of
+from bentwing.products.map_chunks import chunks_of
+from bentwing.products.open3d_package import require_open3d
+from bentwing.products.oriented import OrientedPoints
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+# Names in Open3D of the columns of a chunk; those of one number for each point.
+_COLUMNS = {
+    "time": "times",
+    "range": "ranges",
+    "intensity": "intensity",
+    "sigma": "sigma",
+    "incidence": "incidence",
+    "thickness": "thickness",
+    "shift": "shift",
+    "ring": "ring",
+    "run_id": "run_id",
+}
+
+
+def to_open3d(given: Path | str | MapChunk | OrientedPoints | Trajectory) -> Any:  # noqa: ANN401
+    """Return a map, points or a trajectory as a tensor geometry of Open3D.
+
+    Parameters
+    ----------
+    given : folder of a finished run, whose whole map has to fit into memory, or a value
+
+    Returns
+    -------
+    Of points an `open3d.t.geometry.PointCloud` with float64 `positions` in the coordinates given, of a run
+    those of its map's file, and where they are known `time` (s), `intensity`, `sigma` (m), `range` (m) and the
+    other columns of `MapChunk`, each (N, 1); of `OrientedPoints` also `normals`. Of a trajectory an
+    `open3d.t.geometry.LineSet` through its poses, whose points have `time` and `quaternion` (x, y, z, w).
+
+    Raises
+    ------
+    UsageError
+        If Open3D is not installed, or the folder holds no complete run.
+    InputError
+        If a run has no map.
+    """
+    o3d = require_open3d()
+    if isinstance(given, Trajectory):
+        return _lines(o3d, given)
+    if isinstance(given, OrientedPoints):
+        columns = {"normals": given.normals.astype(np.float32), "intensity": given.intensity}
+        return _cloud(o3d, given.points, columns)
+    chunk = given if isinstance(given, MapChunk) else _whole(given)
+    return _cloud(o3d, chunk.points, {n: getattr(chunk, field) for n, field in _COLUMNS.items()})
+
+
+def from_open3d(geometry: Any) -> MapChunk | Trajectory:  # noqa: ANN401 - Open3D has no types
+    """Return what Open3D has: a cloud as points of a map, lines through timed poses as a trajectory.
+
+    Parameters
+    ----------
+    geometry : `PointCloud` or `LineSet` of `open3d.t.geometry`, or a legacy `PointCloud`. What a cloud does
+        not have is None; times and ranges are then zero
+
+    Raises
+    ------
+    UsageError
+        If it is something else, or lines without `time` and `quaternion`, as `to_open3d` makes them.
+    """
+    o3d = require_open3d()
+    if isinstance(geometry, o3d.geometry.PointCloud):
+        geometry = o3d.t.geometry.PointCloud.from_legacy(geometry, o3d.core.float64)
+    if isinstance(geometry, o3d.t.geometry.PointCloud):
+        return _chunk(geometry)
+    if not isinstance(geometry, o3d.t.geometry.LineSet):
+        msg = f"{type(geometry).__name__} is neither a point cloud nor a line set of Open3D"
+        raise UsageError(msg)
+    if not {"time", "quaternion"} <= set(geometry.point):
+        msg = "the line set is no trajectory; its points need `time` and `quaternion`"
+        raise UsageError(msg)
+    values = geometry.point
+    return Trajectory(
+        values["time"].numpy().ravel().astype(np.float64),
+        values["positions"].numpy().astype(np.float64),
+        values["quaternion"].numpy().astype(np.float64),
+    )
+
+
+def _whole(run: Path | str) -> MapChunk:
+    """Read the whole map of a run."""
+    source = open_map_of(run)
+    chunks = list(chunks_of(source))
+    fields = ("points", *_COLUMNS.values())
+    columns = {name: [getattr(chunk, name) for chunk in chunks] for name in fields}
+    joined = {n: np.concatenate(c) for n, c in columns.items() if all(v is not None for v in c)}
+    joined["points"] += source.origin
+    return MapChunk(**joined)
+
+
+def _cloud(
+    o3d: Any,  # noqa: ANN401
+    points: NDArray[np.float64],
+    columns: Mapping[str, NDArray[Any] | None],
+) -> Any:  # noqa: ANN401
+    cloud = o3d.t.geometry.PointCloud(_tensor(o3d, points))
+    for name, values in columns.items():
+        if values is not None:
+            cloud.point[name] = _tensor(o3d, values.reshape(len(points), -1))
+    return cloud
+
+
+def _lines(o3d: Any, trajectory: Trajectory) -> Any:  # noqa: ANN401
+    first = np.arange(max(len(trajectory) - 1, 0), dtype=np.int32)
+    lines = o3d.t.geometry.LineSet(
+        _tensor(o3d, trajectory.positions), _tensor(o3d, np.column_stack([first, first + 1]))
+    )
+    lines.point["time"] = _tensor(o3d, trajectory.times[:, None])
+    lines.point["quaternion"] = _tensor(o3d, trajectory.quats_xyzw)
+    return lines
+
+
+def _tensor(o3d: Any, values: NDArray[Any]) -> Any:  # noqa: ANN401
+    return o3d.core.Tensor(np.ascontiguousarray(values))
+
+
+def _chunk(cloud: Any) -> MapChunk:  # noqa: ANN401
+    points = cloud.point["positions"].numpy().astype(np.float64)
+    columns: dict[str, Any] = {
+        "times": np.zeros(len(points)),
+        "ranges": np.zeros(len(points), np.float32),
+    }
+    for name, field in _COLUMNS.items():
+        if name in cloud.point:
+            columns[field] = cloud.point[name].numpy().ravel()
+    columns["times"] = columns["times"].astype(np.float64)
+    return MapChunk(points, **columns)

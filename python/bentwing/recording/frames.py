@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 TF_TYPES = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 STATIC = "tf_static"  # how the names of topics end that hold what never changes
 N_MOVING = 500  # messages of /tf, in which every joint that is sent at all comes
+DIGITS = 12  # of m and of a unit quaternion
 MAX_LISTED = 20  # frames in a sentence
 INSTEAD = "give translation and quaternion (or rpy, or matrix) instead of from_tf"
 
@@ -80,11 +81,11 @@ class Frames:
                 T = T @ _matrix(link)
             else:
                 T = T @ transform.inverse(_matrix(self._static[here]))
-        quat = geometry.from_matrices(T[:3, :3])
+        parts = {"translation": T[:3, 3], "quaternion": geometry.from_matrices(T[:3, :3])}
+        # The last digits are of the way through other frames; adding zero leaves no minus zero.
+        rounded = {name: (np.round(part, DIGITS) + 0.0).tolist() for name, part in parts.items()}
         try:
-            return Transform.model_validate(
-                {"translation": T[:3, 3].tolist(), "quaternion": quat.tolist()}
-            )
+            return Transform.model_validate(rounded)
         except ValidationError as error:
             where = f"the pose of {child} in {parent} by /tf_static"
             raise PayloadError(describe(error, Transform, where)) from None

@@ -64,6 +64,9 @@ def _store(ros1: bool):
     store.register(get_types_from_msg(VELODYNE_PACKET, "velodyne_msgs/msg/VelodynePacket"))
     store.register(get_types_from_msg(VELODYNE_SCAN, "velodyne_msgs/msg/VelodyneScan"))
     store.register(get_types_from_msg("uint8[] buf", "ouster_ros/msg/PacketMsg"))
+    if ros1:  # which ROS 2's store has
+        tf = "geometry_msgs/TransformStamped[] transforms"
+        store.register(get_types_from_msg(tf, "tf2_msgs/msg/TFMessage"))
     return store
 
 
@@ -125,6 +128,19 @@ class Messages:
         return self.types["sensor_msgs/msg/JointState"](
             self.header(t), list(names), np.atleast_1d(np.array(angle, float)), empty, empty
         )
+
+    def tf(self, t, *links):
+        """TFMessage of (parent, child, translation, quaternion x y z w)."""
+        vector, quat = (self.types[f"geometry_msgs/msg/{n}"] for n in ("Vector3", "Quaternion"))
+        pose = self.types["geometry_msgs/msg/Transform"]
+        stamped = self.types["geometry_msgs/msg/TransformStamped"]
+        rows = [
+            stamped(
+                self.header(t, parent), child, pose(vector(*map(float, p)), quat(*map(float, q)))
+            )
+            for parent, child, p, q in links
+        ]
+        return self.types["tf2_msgs/msg/TFMessage"](rows)
 
     def cloud(self, t, table: np.ndarray, *, row_step=None, data=None, height=1, frame="lidar"):
         """PointCloud2 of a structured array."""

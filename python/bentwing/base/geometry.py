@@ -83,6 +83,15 @@ def from_matrices(matrices: NDArray[np.float64]) -> NDArray[np.float64]:
     return _positive(quats)
 
 
+def from_rpy(angles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Turn roll, pitch and yaw `(..., 3)` in rad into unit quaternions with w >= 0.
+
+    As in URDF: about the fixed axes x, then y, then z, so R = Rz(yaw) · Ry(pitch) · Rx(roll).
+    """
+    roll, pitch, yaw = (exp(angles[..., i, None] * np.eye(3)[i]) for i in range(3))
+    return _positive(multiply(yaw, multiply(pitch, roll)))
+
+
 def exp(rotation_vectors: NDArray[np.float64]) -> NDArray[np.float64]:
     """Quaternions of rotation vectors `(..., 3)` in rad."""
     v = np.asarray(rotation_vectors, dtype=np.float64)

@@ -55,7 +55,8 @@ def _names_at(location: Sequence[int | str], model: type[BaseModel]) -> list[str
         if inner is None:
             break
         model = inner
-    return [field.alias or name for name, field in model.model_fields.items()]
+    names = [field.alias or name for name, field in model.model_fields.items()]
+    return [*names, *getattr(model, "also_accepted", ())]
 
 
 def _model_in(annotation: Any) -> type[BaseModel] | None:  # noqa: ANN401 - any annotation

@@ -66,7 +66,8 @@ def calibrate(
     """
     head, watch = as_payload(payload), as_progress(progress)
     with Recording(paths, head) as recording:
-        return _calibrated(RecordingPart(recording, head, start, duration), watch, threads)
+        part = RecordingPart(recording, recording.payload, start, duration)
+        return _calibrated(part, watch, threads)
 
 
 def _calibrated(part: RecordingPart, progress: Progress, threads: int | None) -> Calibrated:

@@ -70,6 +70,9 @@ def _sensors(inspection: Inspection) -> Iterator[RenderableType]:
     if inspection.static_start is not None:
         start, end = inspection.static_start
         yield f"start      static from {start:.1f} to {end:.1f} s"
+    if inspection.tf_mount is not None:
+        yield f"frames     {escape(inspection.tf_mount.sentence)}"
+        yield from _pasteable(inspection.tf_mount.line)
     yield from _set_up(inspection.set_up)
     for one in inspection.self_hits:
         first, last = ([f"{c:.2f}" for c in corner] for corner in (one.box.min, one.box.max))
@@ -93,8 +96,13 @@ def _set_up(set_up: SetUp | None) -> Iterator[RenderableType]:
         yield "set-up     as the payload says"
     for finding in set_up.findings:
         yield f"set-up     [yellow]{escape(finding.sentence)}[/yellow]"
-        # not wrapped, so that it can be pasted
-        yield Text(f"           {finding.line}", style="bold", no_wrap=True, overflow="ignore")
+        yield from _pasteable(finding.line)
+
+
+def _pasteable(line: str) -> Iterator[Text]:
+    """Yield a line of payload.yaml, which is not wrapped."""
+    if line:
+        yield Text(f"           {line}", style="bold", no_wrap=True, overflow="ignore")
 
 
 def _spin(spin: Spin) -> Iterator[str]:

@@ -109,6 +109,14 @@ class Payload(Section):
             self.encoder is not None and self.encoder.places_motor
         )
 
+    @property
+    def refers_to_recording(self) -> bool:
+        """Whether a transform is to be read from the /tf_static of a recording."""
+        encoder = self.encoder
+        of_motor = [] if encoder is None else [encoder.T_imu_motor, encoder.T_motor_lidar]
+        given = [one for one in (self.T_imu_lidar, *of_motor) if one is not None]
+        return any(one.from_tf is not None for one in given)
+
     def T_imu_lidar_matrix(self) -> NDArray[np.float64]:
         """(4, 4) of the fixed mount; the identity where none is given (no IMU)."""
         return np.eye(4) if self.T_imu_lidar is None else self.T_imu_lidar.pose.matrix

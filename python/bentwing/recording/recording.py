@@ -15,6 +15,7 @@ from bentwing.recording import imu_units, problems
 from bentwing.recording.clocks.look_ahead import look_ahead
 from bentwing.recording.containers.source import open_source
 from bentwing.recording.fixes import Fixes, read_fixes
+from bentwing.recording.frames import placed
 from bentwing.recording.joints import peek_joints, unclear_joint
 from bentwing.recording.open_streams import open_streams
 from bentwing.recording.packets.peek import peek_imu, peek_lidar
@@ -23,6 +24,7 @@ from bentwing.recording.peek import Peek, peek
 from bentwing.recording.readings import Readings
 from bentwing.recording.slots import group_into_slots, trimmed
 from bentwing.recording.stream_warnings import stream_warnings
+from bentwing.recording.tf_mount import TfMount, tf_mount
 from bentwing.recording.topics import NAV_SAT_FIX, PACKET_TYPES, resolve
 
 if TYPE_CHECKING:
@@ -81,6 +83,7 @@ class Recording:
             raise
 
     def _survey(self) -> None:
+        self.payload = placed(self.payload, self._source)
         roles = resolve(self._source.topics, self.payload)
         found = {role: topic for role, topic in roles._asdict().items() if topic is not None}
         is_alone = all(topic.type in PACKET_TYPES for topic in found.values())
@@ -204,6 +207,12 @@ class Recording:
     def encoder_topic(self) -> str | None:
         """The encoder's topic, None without encoder."""
         return self._topic("encoder")
+
+    def tf_mount(self) -> TfMount | None:
+        """Return what /tf_static says of the lidar on the IMU; None without, or where a motor turns it."""
+        if "imu" not in self._peeks or "encoder" in self._peeks:
+            return None
+        return tf_mount(self._source, self._peeks["lidar"].topic, self._peeks["imu"].topic)
 
     @property
     def joints(self) -> tuple[str, ...]:

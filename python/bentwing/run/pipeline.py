@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from bentwing import odometry
 from bentwing.base.progress import as_progress
+from bentwing.recording.frames import placed_payload
 from bentwing.recording.sections.project import as_project
 from bentwing.run import stages
 from bentwing.run.beams import read_by
@@ -139,6 +140,7 @@ def run_recording(
     """
     watch = as_progress(progress)
     read = [path for path in (settings.prior_map, payload_file) if path is not None]
+    settings = _placed(paths, settings)
     # Refuses at once what the estimator cannot do.
     odometry.create(settings.estimator, settings.payload, settings.of_estimator, settings.threads)
     with (
@@ -171,6 +173,14 @@ def run_recording(
             report_run(folder, found)
             checkpoint.discard()
     return replace(found, payload=head.settings.payload)
+
+
+def _placed(paths: Path | str | Sequence[Path | str], settings: RunSettings) -> RunSettings:
+    """Return the settings with what their payload refers to in the recording."""
+    if not settings.payload.refers_to_recording:
+        return settings
+    listed = [Path(paths)] if isinstance(paths, (str, Path)) else [*map(Path, paths)]
+    return settings.model_copy(update={"payload": placed_payload(listed, settings.payload)})
 
 
 def _open_inputs(job: stages.Job, payload_file: Path | str | None) -> PriorMap | None:

@@ -13,7 +13,9 @@ from bentwing.calibrate.draft import questions
 from bentwing.calibrate.draft.joints import turning_joint
 from bentwing.calibrate.draft.lidar_kind import describe_lidar
 from bentwing.recording.containers.source import open_source
+from bentwing.recording.frames import placed
 from bentwing.recording.payload import Payload, as_payload
+from bentwing.recording.tf_mount import tf_mount
 from bentwing.recording.topics import ENCODER_TYPES, IMU_TYPES, LIDAR_TYPES, candidates
 
 if TYPE_CHECKING:
@@ -77,7 +79,7 @@ def draft_payload(
     source = open_source(listed)
     try:
         described, others = _described(source, listed[0].stem)
-        head = described if payload is None else as_payload(payload)
+        head = described if payload is None else placed(as_payload(payload), source)
         if self_hits:
             head = head.model_copy(update={"self_hits": (*head.self_hits, *self_hits)})
         asked = [*(others if payload is None else ()), *questions.of(head, source.topics)]
@@ -103,6 +105,10 @@ def _described(source: Source, name: str) -> tuple[Payload, list[str]]:
     joint = None if encoder is None else turning_joint(source, encoder)
     if encoder is not None and joint is not None:
         found["encoder"], others = {"topic": encoder.name} | joint, [*others, *also]
+    elif imu is not None and (mount := tf_mount(source, lidar, imu)) is not None:
+        others.append(questions.of_tf(mount))
+        if mount.T_imu_lidar is not None:
+            found["T_imu_lidar"] = mount.T_imu_lidar
     return Payload.model_validate(found), others
 
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from typing import TYPE_CHECKING, get_args
 
 from bentwing.recording.lidar_kinds import LidarKind
@@ -13,7 +14,9 @@ if TYPE_CHECKING:
 
     from bentwing.recording.containers.scanned import TopicInfo
     from bentwing.recording.payload import Payload
+    from bentwing.recording.tf_mount import TfMount
 
+WIDTH = 100  # columns of a comment
 NOISES = {"gyro_noise", "accel_noise"}
 _IDENTITY = "{translation: [0.0, 0.0, 0.0], quaternion: [0.0, 0.0, 0.0, 1.0]}"
 _MOUNT = f"""\
@@ -73,6 +76,11 @@ def of(payload: Payload, topics: Sequence[TopicInfo]) -> Iterator[str]:
     for topic in topics:
         if payload.gnss is None and topic.type == NAV_SAT_FIX and topic.count:
             yield _GNSS.format(topic=topic.name)
+
+
+def of_tf(mount: TfMount) -> str:
+    """Return the comment on what /tf_static says of the mount, wrapped."""
+    return "".join(f"# {line}\n" for line in textwrap.wrap(f"{mount.sentence}.", WIDTH))
 
 
 def other_topics(role: str, names: Sequence[str]) -> str:

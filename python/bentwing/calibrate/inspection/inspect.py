@@ -19,7 +19,7 @@ from bentwing.calibrate.inspection.structure import Structure, StructureMeter
 from bentwing.calibrate.set_up import find_set_up
 from bentwing.recording.batches import EncoderBatch, ImuBatch
 from bentwing.recording.containers.source import open_source
-from bentwing.recording.payload import as_payload
+from bentwing.recording.frames import placed_payload
 from bentwing.recording.preprocess import Preprocessing
 from bentwing.recording.recording import Recording
 
@@ -29,8 +29,9 @@ if TYPE_CHECKING:
     from bentwing.calibrate.inspection.fitness import Stretch
     from bentwing.calibrate.set_up import SetUp
     from bentwing.recording.containers.scanned import TopicInfo
-    from bentwing.recording.payload import PayloadLike
+    from bentwing.recording.payload import Payload, PayloadLike
     from bentwing.recording.sections.self_hits import SelfHit
+    from bentwing.recording.tf_mount import TfMount
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +65,7 @@ class Inspection:
     defects : what prevents mapping, each with how to repair it
     warnings : what may make the map worse
     set_up : the sensor head as the motion shows it; None where there is no IMU and no encoder
+    tf_mount : where the lidar is on the IMU by /tf_static; None without it
     """
 
     paths: list[str]
@@ -80,6 +82,7 @@ class Inspection:
     warnings: list[str] = field(default_factory=list)
     set_up: SetUp | None = None
     clocks: dict[str, str] = field(default_factory=dict)
+    tf_mount: TfMount | None = None
 
     @property
     def is_fit(self) -> bool:
@@ -101,6 +104,7 @@ def inspect(paths: Path | str | Sequence[Path | str], payload: PayloadLike = Non
         Nothing in it can be read at all; every lesser defect is part of the result.
     """
     listed = [Path(path) for path in ([paths] if isinstance(paths, (str, Path)) else paths)]
+    payload = None if payload is None else placed_payload(listed, payload)
     try:
         set_up = _set_up(listed, payload)
         is_known = set_up is not None and set_up.doubt is None
@@ -112,8 +116,8 @@ def inspect(paths: Path | str | Sequence[Path | str], payload: PayloadLike = Non
     return replace(found, set_up=set_up)
 
 
-def _set_up(paths: list[Path], payload: PayloadLike) -> SetUp | None:
-    described = draft_payload(paths).payload if payload is None else as_payload(payload)
+def _set_up(paths: list[Path], payload: Payload | None) -> SetUp | None:
+    described = draft_payload(paths).payload if payload is None else payload
     with Recording(paths, described, strict=False) as recording:
         moves = recording.imu_topic is not None or recording.encoder_topic is not None
         if not moves or recording.point_times is None:
@@ -186,6 +190,7 @@ def _inspect_recording(recording: Recording, *, has_payload: bool) -> Inspection
         judgement.defects,
         recording.warnings + warnings,
         clocks={role: str(clock) for role, clock in recording.clocks.items()},
+        tf_mount=recording.tf_mount(),
     )
 
 

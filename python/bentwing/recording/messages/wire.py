@@ -47,7 +47,7 @@ def broken_if_malformed(parse: Callable[P, R]) -> Callable[P, R]:
     return checked
 
 
-def _order(raw: bytes | memoryview, *, cdr: bool) -> str:
+def byte_order(raw: bytes | memoryview, *, cdr: bool) -> str:
     """Return the byte order of the message, '<' or '>'."""
     if not cdr or raw[:2] == CDR_LITTLE_ENDIAN:
         return "<"
@@ -64,7 +64,7 @@ def align(position: int, size: int, *, cdr: bool) -> int:
 
 def header(raw: bytes, *, cdr: bool) -> tuple[int, int, str]:
     """Return stamp in ns, position after the header, and byte order."""
-    order = _order(raw, cdr=cdr)
+    order = byte_order(raw, cdr=cdr)
     # ROS 1 has a sequence number where CDR has the encapsulation: the rest lies at equal offsets.
     sec, nsec, size = struct.unpack_from(f"{order}iII" if cdr else "<III", raw, 4)
     return sec * NS_PER_S + nsec, 16 + size, order
@@ -74,6 +74,18 @@ def header(raw: bytes, *, cdr: bool) -> tuple[int, int, str]:
 def stamp_ns(raw: bytes, *, cdr: bool) -> int:
     """Return the header stamp of any message that begins with a header."""
     return header(raw, cdr=cdr)[0]
+
+
+@broken_if_malformed
+def frame_id(raw: bytes, *, cdr: bool) -> str:
+    """Return the frame in the header of any message that begins with one."""
+    _, end, _ = header(raw, cdr=cdr)
+    return frame_name(raw[16:end])
+
+
+def frame_name(raw: bytes) -> str:
+    """Return a frame's name, without CDR's final zero and the slash in front that the first tf had."""
+    return raw.rstrip(b"\0").decode("utf-8", "replace").strip("/")
 
 
 @broken_if_malformed

@@ -3,13 +3,23 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, field_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    SerializerFunctionWrapHandler,
+    field_validator,
+    model_serializer,
+    model_validator,
+)
 
+from bentwing.base.errors import PayloadError
 from bentwing.base.mount import Pose
 from bentwing.base.units import Unit
+from bentwing.recording.sections.transform_forms import OTHER_FORMS, as_quaternion
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 MOST = 1e9  # of any quantity of a head in its unit; beyond it squares and products end
@@ -32,6 +42,8 @@ class Section(BaseModel):
     """A part of payload.yaml: frozen, and without keys that it does not know."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
+    also_accepted: ClassVar[tuple[str, ...]] = ()
+    """Keys that a file may give and that are turned into fields on entry."""
 
     def differing(self) -> dict[str, Any]:
         """Return the fields that differ from their defaults, and the sections that were given."""
@@ -53,17 +65,38 @@ def require_lever(value: Vector) -> Vector:
     return value
 
 
+class FromTf(Section):
+    """Two frames of the recording's /tf_static, named as there."""
+
+    parent: Topic
+    child: Topic
+
+
 class Transform(Section):
-    """Rigid transform.
+    """Rigid transform; `transform_forms` has the other ways in which a file may give its rotation.
 
     Attributes
     ----------
     translation : m
     quaternion : x y z w, normalized on entry
+    from_tf : where to read both from; None once a recording has told them
     """
 
+    also_accepted: ClassVar[tuple[str, ...]] = OTHER_FORMS
     translation: Lever = (0.0, 0.0, 0.0)
     quaternion: Annotated[Quaternion, Unit("x y z w")] = (0.0, 0.0, 0.0, 1.0)
+    from_tf: FromTf | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_any_form(cls, given: Any) -> Any:  # noqa: ANN401 - whatever the file holds
+        return as_quaternion(given) if isinstance(given, dict) else given
+
+    @model_serializer(mode="wrap")
+    def _as_given(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        values: dict[str, Any] = handler(self)
+        reference = values.pop("from_tf")
+        return values if reference is None else {"from_tf": reference}
 
     @field_validator("translation")
     @classmethod
@@ -86,5 +119,17 @@ class Transform(Section):
 
     @property
     def pose(self) -> Pose:
-        """The transform as arrays."""
+        """The transform as arrays.
+
+        Raises
+        ------
+        PayloadError
+            Only a recording can tell it.
+        """
+        if self.from_tf is not None:
+            msg = (
+                f"the pose of {self.from_tf.child} in {self.from_tf.parent} is in the /tf_static of a "
+                "recording, and here is none: give translation and quaternion instead of from_tf"
+            )
+            raise PayloadError(msg)
         return Pose(np.array(self.translation), np.array(self.quaternion))

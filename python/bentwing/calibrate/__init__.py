@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from bentwing.calibrate.head import calibrate
-    from bentwing.calibrate.inspection.inspect import Inspection, inspect
+    from bentwing.calibrate.inspection.look import Inspection, inspect
     from bentwing.calibrate.outcome import Calibrated
 else:
     from bentwing.base.lazy import lazy
@@ -16,7 +16,7 @@ else:
         __name__,
         {
             "calibrate.head": ["calibrate"],
-            "calibrate.inspection.inspect": ["Inspection", "inspect"],
+            "calibrate.inspection.look": ["Inspection", "inspect"],
             "calibrate.outcome": ["Calibrated"],
         },
     )

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
     from bentwing.calibrate.inspection import Inspection
-    from bentwing.calibrate.inspection.inspect import TopicReport
+    from bentwing.calibrate.inspection.look import TopicReport
     from bentwing.calibrate.inspection.spin import Spin
     from bentwing.calibrate.set_up import SetUp
 

@@ -26,7 +26,7 @@ def test_keys_stand_alone_or_below_project(tmp_path):
 @pytest.mark.parametrize(
     ("text", "part"),
     [
-        ("nam: x", "did you mean 'name'?"),
+        ("sit: x", "did you mean 'site'?"),
         ("name: [1]", "name: input should be a valid string"),
         ("time_zone: Mars/Phobos", "give one such as Europe/Berlin"),
         ("{}", "says nothing of a project"),

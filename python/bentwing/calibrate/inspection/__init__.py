@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from bentwing.calibrate.inspection.fitness import Judgement, judge
-    from bentwing.calibrate.inspection.inspect import Inspection, inspect
+    from bentwing.calibrate.inspection.look import Inspection, inspect
 else:
     from bentwing.base.lazy import lazy
 
@@ -15,7 +15,7 @@ else:
         __name__,
         {
             "calibrate.inspection.fitness": ["Judgement", "judge"],
-            "calibrate.inspection.inspect": ["Inspection", "inspect"],
+            "calibrate.inspection.look": ["Inspection", "inspect"],
         },
     )
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 
 import numpy as np
@@ -157,6 +158,8 @@ def test_no_payload_is_needed(simulated, tmp_path, head):
     run = map_recording(folder / "recording.bag", None, tmp_path / "run", map_spacing=0.05)
     assert run.verdict.state == "good"
     assert score(folder, tmp_path / "run").ate < 0.006
+    said = json.loads((tmp_path / "run/run.json").read_text())["set_up"]
+    assert any("mirror image" in finding["sentence"] for finding in said)
     mount = run.estimate.calibration.mount
     if head == "vlp16-motor":
         # Which turn of the motor is its zero nobody can tell.

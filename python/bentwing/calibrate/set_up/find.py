@@ -14,7 +14,7 @@ from bentwing.calibrate.set_up.motor import UNITS, describe_motor, zero_between
 from bentwing.calibrate.set_up.noise import ImuNoise, states_noise
 from bentwing.calibrate.set_up.planar import describe_by_trials
 from bentwing.calibrate.set_up.refine import Refinement
-from bentwing.calibrate.set_up.set_up import SetUp
+from bentwing.calibrate.set_up.set_up import Finding, SetUp
 from bentwing.calibrate.set_up.signals import Averages
 from bentwing.calibrate.set_up.spatial import describe_by_motion, followed
 from bentwing.calibrate.set_up.stretch import read_stretch
@@ -32,6 +32,12 @@ if TYPE_CHECKING:
 
 TURNING = 0.1  # rad/s, more than the bias of any gyro
 LEAST_TURNING, STEP = 2.0, 0.5  # s, and s over which rates are averaged
+BELIEVED = Finding(
+    "mirrored",
+    "without a payload a lidar cannot be told from its mirror image with a negated accelerometer: both are "
+    "taken as they are, so compare a room with the map",
+    "lidar: {mirrored: false}",
+)
 LOOKED_AT = 5000  # points that tell a 2D lidar from a 3D one
 
 
@@ -57,10 +63,13 @@ def find_set_up(
         The recording cannot be read.
     """
     try:
-        found = _Search(paths, payload, after, threads).found()
+        search = _Search(paths, payload, after, threads)
+        found = search.found()
     except NotFoundError as error:
         return SetUp(payload, doubt=str(error), is_defect=isinstance(error, DefectError))
     findings = findings_between(payload, found)
+    if search.believes_the_hand:
+        findings = (*findings, BELIEVED)
     return SetUp(found if findings else payload, findings)
 
 
@@ -85,6 +94,11 @@ class _Search:
             self._stretch = read_stretch(recording, after)
             self._imu = recording.imu_topic
             self._encoder = None if payload.encoder is None else recording.encoder_topic
+
+    @property
+    def believes_the_hand(self) -> bool:
+        """Whether the mirror image of the head would explain the recording as well."""
+        return self._imu is not None and not self._has_mount
 
     def found(self) -> Payload:
         """Return the payload with all that was found."""

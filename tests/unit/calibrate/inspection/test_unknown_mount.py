@@ -6,4 +6,4 @@ def test_a_spinning_scanner_is_not_called_level_where_its_mount_is_unknown(simul
     found = inspect([simulated("office", 22.0) / "recording.bag"], None)
     assert found.defects == []
     assert found.set_up.doubt is None
-    assert [finding.kind for finding in found.set_up.findings] == ["mount"]
+    assert [finding.kind for finding in found.set_up.findings] == ["mount", "mirrored"]

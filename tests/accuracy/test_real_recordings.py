@@ -23,7 +23,7 @@ KISS_ICP_END, KISS_ICP_YAW = (11.1, 0.0, 0.0), np.radians(1.4)
 @pytest.fixture(scope="module")
 def garage(shared_data, tmp_path_factory):
     out = tmp_path_factory.mktemp("garage")
-    map_recording(shared_data / "garage_hdl32.bag", None, out, threads=2)
+    map_recording(shared_data / "garage_hdl32.bag", None, out, refine=False, threads=2)
     return out
 
 

@@ -52,6 +52,7 @@ def finished_run(
     *,
     placed: MapProjection | None = None,
     map_format: str = "laz",
+    shift: np.ndarray | None = None,
     **settings: Any,
 ) -> Path:
     """Write a run with a map of points (N, 3) m, frame of the trajectory, measured evenly in time."""
@@ -66,6 +67,7 @@ def finished_run(
         (np.arange(n) % 200 + 2).astype(np.float32),
         (np.arange(n) % 16).astype(np.uint16),
         incidence=np.linspace(0, 1.5, n).astype(np.float32),
+        shift=shift,
     )
     name = f"map.{map_format}"
     wkt = None if placed is None else placed.system.wkt

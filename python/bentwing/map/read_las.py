@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import laspy
 import numpy as np
@@ -36,10 +36,10 @@ def las_points(path: Path) -> Iterator[Table]:
             raise InputError(msg)
 
 
-def las_run_ids(path: Path) -> Iterator[NDArray[np.uint16]]:
-    """Read which run the points are from, in the parts of `las_points`; none where that is unknown."""
+def las_column(path: Path, name: str) -> Iterator[NDArray[Any]]:
+    """Read a column of the points, in the parts of `las_points`; none where the file does not have it."""
     require_sound_las(path)
     with laspy.open(path) as file:
-        if "run_id" in file.header.point_format.dimension_names:
+        if name in file.header.point_format.dimension_names:
             for part in file.chunk_iterator(PART):
-                yield np.array(part.run_id, np.uint16)
+                yield np.array(part[name])

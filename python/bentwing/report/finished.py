@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    Array = NDArray[np.float64]
+
 _PAUSE = 10.0  # s between runs that follow each other, as where they were merged
 _LAS = frozenset({".las", ".laz"})
 
@@ -75,7 +77,7 @@ class FinishedRun:
         return cls(folder, record, _joined(poses), map_of(folder), tuple(starts), tuple(offsets))
 
     def parts(self) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
-        """Yield the points (N, 3) m of the map in the trajectory's frame, with times (N,) s.
+        """Yield the points (N, 3) m of the map in the trajectory's frame as measured, with times (N,) s.
 
         Raises
         ------
@@ -85,20 +87,31 @@ class FinishedRun:
             return
         begin = adjusted_gps_origin(min(self._starts)) if self.map.suffix in _LAS else 0.0
         late = np.array(self._offsets) - [(s - min(self._starts)) / 1e9 for s in self._starts]
-        runs = self._run_ids()
+        runs, shifts = self._column("run_id"), self._column("shift")
         for part in read_parts(self.map, self.record.get("georeference")):
             times = np.zeros(len(part.points)) if part.times is None else part.times - begin
-            yield part.points, times + late[next(runs)]
+            run = np.clip(next(runs).astype(np.intp), 0, len(self._starts) - 1)
+            times = times + late[run]
+            yield self._measured(part.points, times, next(shifts)), times
 
-    def _run_ids(self) -> Iterator[NDArray[np.intp] | int]:
-        """Yield which run the points of each part are from; without that, as if all were of the first."""
-        if self.map is not None and len(self._starts) > 1 and self.map.suffix in _LAS:
-            from bentwing.map.read_las import las_run_ids
+    def _measured(self, points: Array, times: Array, shifts: NDArray[Any]) -> Array:
+        """Return points before they were moved along their beams; the lidar is nearly where the IMU is."""
+        if not shifts.any() or not len(self.trajectory.times):
+            return points
+        begin, end = self.trajectory.times[[0, -1]]
+        beams = points - self.trajectory.interpolate(np.clip(times, begin, end))[0]
+        lengths = np.maximum(np.linalg.norm(beams, axis=1), 1e-6)
+        measured: Array = points - beams * (shifts.astype(np.float64) / lengths)[:, None]
+        return measured
 
-            for ids in las_run_ids(self.map):
-                yield np.clip(ids.astype(np.intp), 0, len(self._starts) - 1)
+    def _column(self, name: str) -> Iterator[NDArray[Any]]:
+        """Yield a column of the map part by part, and zero where it does not have it."""
+        if self.map is not None and self.map.suffix in _LAS:
+            from bentwing.map.read_las import las_column
+
+            yield from las_column(self.map, name)
         while True:
-            yield 0
+            yield np.zeros(1)
 
 
 def trajectory_of(path: Path, record: Mapping[str, Any]) -> tuple[Trajectory, int]:

@@ -110,3 +110,9 @@ def test_a_reference_is_kept_in_the_file_and_is_no_pose_without_a_recording(tmp_
     }
     with pytest.raises(PayloadError, match=r"lidar_link in imu_link .* /tf_static"):
         _ = head.T_imu_lidar.pose
+
+
+@pytest.mark.parametrize("left_out", ["exclude_defaults", "exclude_unset", "exclude_none"])
+def test_a_transform_can_be_written_without_what_goes_without_saying(tmp_path, left_out):
+    payload = load(tmp_path, "T_imu_lidar: {}")
+    assert "from_tf" not in payload.model_dump(**{left_out: True}).get("T_imu_lidar", {})

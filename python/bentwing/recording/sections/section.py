@@ -95,7 +95,7 @@ class Transform(Section):
     @model_serializer(mode="wrap")
     def _as_given(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
         values: dict[str, Any] = handler(self)
-        reference = values.pop("from_tf")
+        reference = values.pop("from_tf", None)  # which may be left out already
         return values if reference is None else {"from_tf": reference}
 
     @field_validator("translation")

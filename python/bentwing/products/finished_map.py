@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bentwing.base.errors import InputError, UsageError
+from bentwing.base.regular_file import resolved
 from bentwing.base.run_record import RECORD, finished_record, understood
 from bentwing.base.trajectory import Trajectory, read_tum
 from bentwing.map.epsg import epsg_of_map
@@ -83,8 +84,8 @@ class FinishedMap:
         if not out.parent.is_dir():
             msg = f"{out}: there is no folder {out.parent}; make it, or name a file elsewhere"
             raise UsageError(msg)
-        results = {(self.folder / name).resolve() for name in (*self.record["files"], RECORD)}
-        if out.resolve() in results:
+        results = {resolved(self.folder / name) for name in (*self.record["files"], RECORD)}
+        if resolved(out) in results:
             msg = f"{out}: is a result of the run; name another file"
             raise UsageError(msg)
 

@@ -13,6 +13,7 @@ from bentwing.base.run_record import finished_record, understood
 from bentwing.base.trajectory import Trajectory, read_tum
 from bentwing.map.formats import MAP_SUFFIXES
 from bentwing.map.gps_time import adjusted_gps_origin
+from bentwing.map.measured import moved_back
 from bentwing.map.read import read_parts
 
 if TYPE_CHECKING:
@@ -99,10 +100,8 @@ class FinishedRun:
         if not shifts.any() or not len(self.trajectory.times):
             return points
         begin, end = self.trajectory.times[[0, -1]]
-        beams = points - self.trajectory.interpolate(np.clip(times, begin, end))[0]
-        lengths = np.maximum(np.linalg.norm(beams, axis=1), 1e-6)
-        measured: Array = points - beams * (shifts.astype(np.float64) / lengths)[:, None]
-        return measured
+        seen_from = self.trajectory.interpolate(np.clip(times, begin, end))[0]
+        return moved_back(points, seen_from, shifts.astype(np.float64))
 
     def _column(self, name: str) -> Iterator[NDArray[Any]]:
         """Yield a column of the map part by part, and zero where it does not have it."""

@@ -14,6 +14,7 @@ from bentwing.base.mount import FixedMount
 from bentwing.base.run_record import read_record
 from bentwing.base.trajectory import Trajectory, read_tum
 from bentwing.map.gps_time import adjusted_gps_origin
+from bentwing.map.measured import moved_back
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -39,9 +40,7 @@ def measured_points(path: Path, origin_ns: int) -> tuple[Array, Array]:
     lidar = path_of_lidar(found, Calibration.from_json(read_record(path.parent)["calibration"]))
     # GPS times are rounded to less than a microsecond.
     places, _ = lidar.interpolate(np.clip(times, lidar.times[0], lidar.times[-1]))
-    beams = points - places
-    beams /= np.maximum(np.linalg.norm(beams, axis=1), 1e-6)[:, None]
-    return points - beams * np.asarray(table["shift"])[:, None], times
+    return moved_back(points, places, np.asarray(table["shift"], np.float64)), times
 
 
 def path_of_lidar(trajectory: Trajectory, calibration: Calibration) -> Trajectory:

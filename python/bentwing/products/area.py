@@ -1,18 +1,18 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""An area in plan: read from GeoJSON, and which share of each cell it covers."""
+"""An area in plan: read from a file, and which share of each cell it covers."""
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bentwing.base.arguments import finite_array
 from bentwing.base.errors import InputError
-from bentwing.base.regular_file import require_regular
 from bentwing.base.value import Value
+from bentwing.map import polygon_file
+from bentwing.map.polygon import Polygon
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 _FINER = 10  # places along each edge of a cell that are looked at
-_LARGEST = 2**26  # bytes of a file
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,14 +72,7 @@ class Area(Value):
 
     def holds(self, places: Array) -> NDArray[np.bool_]:
         """Tell which places (N, 2) m are inside."""
-        inside = np.zeros(len(places), np.bool_)
-        x, y = places.T
-        for ring in self.rings:
-            for (x0, y0), (x1, y1) in zip(ring, np.roll(ring, -1, axis=0), strict=True):
-                between = (y0 <= y) != (y1 <= y)
-                with np.errstate(divide="ignore", invalid="ignore"):
-                    inside ^= between & (x < x0 + (y - y0) / (y1 - y0) * (x1 - x0))
-        return inside
+        return Polygon(self.rings).contains(places)
 
     def shares(self, corner: Array, shape: tuple[int, int], cell: float) -> Array:
         """Return the covered area (H, W) m² of the cells of a grid; together they are the area."""
@@ -97,43 +89,22 @@ class Area(Value):
 
 
 def read_area(path: Path) -> Area:
-    """Read the one polygon of a GeoJSON file, in the coordinates of the map.
+    """Read the one polygon of a GeoJSON or DXF file, in the coordinates of the map.
 
     Raises
     ------
-    InputError
+    UsageError, InputError
         If the file is not readable, or holds no polygon or several.
     """
+    polygons = polygon_file.read_area(path).polygons
+    if len(polygons) != 1:
+        msg = f"{path}: holds {len(polygons)} polygons; give a file with one"
+        raise InputError(msg)
     try:
-        require_regular(path)
-        if path.stat().st_size > _LARGEST:
-            msg = f"{path}: has more than {_LARGEST} bytes; give a file with one polygon"
-            raise InputError(msg)
-        polygons = list(_polygons(json.loads(path.read_text(encoding="utf-8"))))
-        if len(polygons) == 1:
-            return Area.of(polygons[0])
-    except OSError as error:
-        msg = f"{path}: not readable ({error.strerror})"
+        return Area.of(polygons[0].rings)
+    except ValueError as error:
+        msg = f"{path}: not readable as an area ({error})"
         raise InputError(msg) from error
-    except (ValueError, TypeError, KeyError, RecursionError) as error:
-        msg = f"{path}: not readable as GeoJSON ({str(error)[:200]}); give a file with one polygon"
-        raise InputError(msg) from error
-    msg = f"{path}: holds {len(polygons)} polygons; give a file with one"
-    raise InputError(msg)
-
-
-def _polygons(found: Any) -> Any:  # noqa: ANN401 - whatever is in the file
-    kind = found["type"]
-    if kind == "FeatureCollection":
-        for feature in found["features"]:
-            yield from _polygons(feature)
-    elif kind == "Feature":
-        yield from _polygons(found["geometry"])
-    elif kind == "Polygon":
-        yield [[corner[:2] for corner in ring] for ring in found["coordinates"]]
-    elif kind == "MultiPolygon":
-        for rings in found["coordinates"]:
-            yield [[corner[:2] for corner in ring] for ring in rings]
 
 
 def _signed(ring: Array) -> float:

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     )
     from bentwing.base.estimate import Estimate
     from bentwing.base.inertial_unit import InertialUnit
-    from bentwing.base.mount import FixedMount, MotorMount, Mount, Pose
+    from bentwing.base.mount import FixedMount, MotorErrors, MotorMount, Mount, Pose
     from bentwing.base.progress import Progress
     from bentwing.base.trajectory import Trajectory, read_tum
     from bentwing.base.window_record import WindowRecord
@@ -73,7 +73,7 @@ else:
             ],
             "base.estimate": ["Estimate"],
             "base.inertial_unit": ["InertialUnit"],
-            "base.mount": ["FixedMount", "MotorMount", "Mount", "Pose"],
+            "base.mount": ["FixedMount", "MotorErrors", "MotorMount", "Mount", "Pose"],
             "base.progress": ["Progress"],
             "base.trajectory": ["Trajectory", "read_tum"],
             "base.window_record": ["WindowRecord"],
@@ -123,6 +123,7 @@ __all__ = [
     "InertialUnit",
     "InputError",
     "Merged",
+    "MotorErrors",
     "MotorMount",
     "Mount",
     "NotEnoughDataError",

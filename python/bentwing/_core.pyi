@@ -355,6 +355,7 @@ class Globals:
     motor_axis : (3,) motor frame; only for motor-turned lidars, with `T_motor_lidar`
     encoder_zero : rad, added to every encoder angle
     T_motor_lidar : pose of the lidar in the rotating motor frame
+    motor_errors : how the motor turns otherwise than its encoder reads, see `motor_errors`
     ranges : (2,) by how much ranges are too long, see `ranges`
     """
 
@@ -370,6 +371,7 @@ class Globals:
         motor_axis: _Vector | None = None,
         encoder_zero: float = 0.0,
         T_motor_lidar: _Transform | None = None,
+        motor_errors: tuple[Sequence[float], Sequence[Sequence[float]]] | None = None,
         latency_rate: float = 0.0,
         latency_epoch: float = 0.0,
         ranges: Sequence[float] = ...,
@@ -423,6 +425,10 @@ class Globals:
         """Added to every encoder angle, rad; zero without a motor."""
 
     @property
+    def motor_errors(self) -> tuple[list[float], list[list[float]]] | None:
+        """`eccentricity` (2,) and `wobble` (2, 4) of `MotorErrors`, rad; None without a motor."""
+
+    @property
     def motor_lidar_translation(self) -> NDArray[np.float64] | None:
         """Translation (3,) of the lidar in the rotating motor frame, m; None without a motor."""
 
@@ -431,7 +437,7 @@ class Globals:
         """Rotation (4,) of the lidar in the rotating motor frame; None without a motor."""
 
     def moved_from(self, earlier: Globals) -> list[float]:
-        """Return the correction (47,) that leads from `earlier` to these."""
+        """Return the correction (57,) that leads from `earlier` to these."""
 
     def levelled(self) -> Globals:
         """Return the same states with gravity straight up."""
@@ -446,7 +452,7 @@ class Samples:
     dt : s, interval of the samples
     positions : (N, 3) float64, m, map frame, at least two
     quats_xyzw : (N, 4) float64, unit
-    responses : (K, 6, 47) float64, how the first K follow the slow states, see `responses_at`
+    responses : (K, 6, 57) float64, how the first K follow the slow states, see `responses_at`
     """
 
     def __new__(
@@ -484,10 +490,10 @@ class Samples:
         """Return these samples with those from `first` on replaced by `newer`."""
 
     def following(self, correction: Sequence[float]) -> Samples:
-        """Return these samples where a correction (47,) of the slow states moves them."""
+        """Return these samples where a correction (57,) of the slow states moves them."""
 
     def responses_at(self, samples: Sequence[int]) -> NDArray[np.float64]:
-        """How samples follow the slow states (K, 6, 47): `[δr, δt]`, rad and m, map frame, by each."""
+        """How samples follow the slow states (K, 6, 57): `[δr, δt]`, rad and m, map frame, by each."""
 
     def extended(self, imu: Imu | None, globals: Globals, until: float) -> tuple[Samples, int]:
         """Extend by the IMU, or at constant velocity without one.
@@ -617,7 +623,7 @@ class Registration:
 
     @property
     def covariance(self) -> NDArray[np.float64]:
-        """Covariance (47, 47) of the slow states; zero where frozen."""
+        """Covariance (57, 57) of the slow states; zero where frozen."""
 
     def sample_covariances(self) -> NDArray[np.float64]:
         """Compute the covariances (N, 6, 6) of the correction of each sample, rotation first.
@@ -630,7 +636,7 @@ class Registration:
 
     @property
     def offset(self) -> list[float]:
-        """Correction (47,) that leads from the prior's mean to `globals`."""
+        """Correction (57,) that leads from the prior's mean to `globals`."""
 
     @property
     def n_surfels(self) -> int:
@@ -701,10 +707,10 @@ class Piece:
     samples : trajectory to start from
     surfels : of consecutive stretches of some seconds, in order of time
     imu : its inertial samples, less the history of their biases; None for a lidar alone
-    information : (47, 47) float64 about the prior's mean of the slow states
-    offset : (47,) correction that leads from that mean to `globals`
-    frozen : (47) slow states that are not estimated
-    optional : (47) those that stay as they are unless the recording shows that they are others
+    information : (57, 57) float64 about the prior's mean of the slow states
+    offset : (57,) correction that leads from that mean to `globals`
+    frozen : (57) slow states that are not estimated
+    optional : (57) those that stay as they are unless the recording shows that they are others
     shown_noise : times, s, and how large the noise of gyro and accelerometer shows itself then, as
         standard deviations over the stated ones; without any as stated. Weights stay as stated.
     """
@@ -737,7 +743,7 @@ class GlobalRegistration:
 
     @property
     def covariances(self) -> list[NDArray[np.float64]]:
-        """Covariances (47, 47) of the slow states; zero where frozen."""
+        """Covariances (57, 57) of the slow states; zero where frozen."""
 
     @property
     def iterations(self) -> list[tuple[int, int, float, float, float, float]]:
@@ -817,9 +823,9 @@ def register_window(
 
     Parameters
     ----------
-    information : (47, 47) float64 about the prior's mean of the slow states
-    offset : (47,) correction that leads from that mean to `globals`
-    frozen : (47) slow states that are not estimated
+    information : (57, 57) float64 about the prior's mean of the slow states
+    offset : (57,) correction that leads from that mean to `globals`
+    frozen : (57) slow states that are not estimated
     joined : whether the start continues a past that is final (its first three control points follow
         the slow states as `samples` do); otherwise only the first pose stays
 

@@ -11,6 +11,12 @@ from bentwing import _core
 from bentwing.odometry.continuous.slow_states import N_STATES
 
 HERE = ((0.1, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
+MOTOR = {
+    "motor_axis": (0.0, 0.6, 0.8),
+    "encoder_zero": 0.2,
+    "T_motor_lidar": HERE,
+    "motor_errors": ([1e-3, -2e-3], [[1e-4, 2e-4, 3e-4, 4e-4], [5e-4, 6e-4, 7e-4, 8e-4]]),
+}
 
 
 def pickled(value):
@@ -38,9 +44,7 @@ def test_samples_come_back_with_their_responses(register, again):
 
 
 @pytest.mark.parametrize("again", [copy.deepcopy, pickled])
-@pytest.mark.parametrize(
-    "motor", [{}, {"motor_axis": (0.0, 0.6, 0.8), "encoder_zero": 0.2, "T_motor_lidar": HERE}]
-)
+@pytest.mark.parametrize("motor", [{}, MOTOR])
 def test_slow_states_come_back_as_they_were(states, again, motor):
     slow = states(latency=0.003, gyro_bias=(0.1, 0.2, 0.3), ranges=(-0.02, 4e-4), **motor)
     other = again(slow)
@@ -49,6 +53,7 @@ def test_slow_states_come_back_as_they_were(states, again, motor):
     assert np.array_equal(other.gyro_bias, slow.gyro_bias)
     assert other.encoder_zero == slow.encoder_zero
     assert list(other.ranges) == list(slow.ranges) == [-0.02, 4e-4]
+    assert other.motor_errors == slow.motor_errors == motor.get("motor_errors")
     assert (other.motor_lidar_translation is None) == (not motor)
 
 
@@ -76,5 +81,5 @@ def test_columns_that_do_not_fit_together_are_refused(changes, sentence):
 
 def test_responses_of_another_shape_are_refused():
     still = np.tile([0.0, 0.0, 0.0, 1.0], (2, 1))
-    with pytest.raises(ValueError, match=r"responses: expected a C-contiguous array \(K, 6, 47\)"):
+    with pytest.raises(ValueError, match=r"responses: expected a C-contiguous array \(K, 6, 57\)"):
         _core.Samples(0.0, 0.01, np.zeros((2, 3)), still, np.zeros((2, 5, N_STATES)))

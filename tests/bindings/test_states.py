@@ -158,7 +158,7 @@ def test_settings_without_a_field_are_refused(extract):
 
 def test_information_must_be_square(register):
     for n in (N_STATES - 1, N_STATES + 1):
-        with pytest.raises(ValueError, match=r"^information: expected shape \(47, 47\), got "):
+        with pytest.raises(ValueError, match=r"^information: expected shape \(57, 57\), got "):
             register(surfels=[], information=np.resize(1e6 * np.eye(N_STATES), (n, N_STATES)))
 
 

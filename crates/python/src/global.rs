@@ -115,7 +115,7 @@ impl GlobalRegistration {
         pieces.map(|p| Globals(p.globals.clone())).collect()
     }
 
-    /// Covariances (47, 47) of the slow states, in the order of the pieces; zero where frozen.
+    /// Covariances (57, 57) of the slow states, in the order of the pieces; zero where frozen.
     #[getter]
     fn covariances<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyArray2<f64>>>> {
         let rows = |m: &core::GlobalMatrix| -> Vec<[f64; N_GLOBALS]> {

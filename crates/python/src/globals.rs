@@ -2,7 +2,7 @@
 //! The slow states for Python.
 
 use bentwing_registration::{Globals as RustGlobals, N_GLOBALS};
-use bentwing_trajectory::{Head, InertialUnit, LidarClock, Motor, RangeBias};
+use bentwing_trajectory::{Head, InertialUnit, LidarClock, Motor, MotorErrors, RangeBias};
 use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
 use numpy::{PyArray1, ToPyArray};
 use pyo3::exceptions::PyValueError;
@@ -70,13 +70,33 @@ impl Unit {
     }
 }
 
+/// Errors of a motor: `eccentricity` (2) and `wobble` (2, 4), rad.
+#[derive(FromPyObject, IntoPyObject)]
+struct Errors([f64; 2], [[f64; 4]; 2]);
+
+impl Errors {
+    fn of(errors: &MotorErrors) -> Self {
+        Self(errors.eccentricity, errors.wobble)
+    }
+
+    fn checked(&self) -> PyResult<MotorErrors> {
+        for &v in self.0.iter().chain(self.1.as_flattened()) {
+            finite_number("motor_errors", v)?;
+        }
+        Ok(MotorErrors {
+            eccentricity: self.0,
+            wobble: self.1,
+        })
+    }
+}
+
 #[pymethods]
 impl Globals {
     /// Transforms are pairs of translation (3) and quaternion x, y, z, w.
     #[new]
     #[pyo3(signature = (
         T_imu_base, *, latency, gyro_bias, accel_bias, gravity, unit = None,
-        motor_axis = None, encoder_zero = 0.0, T_motor_lidar = None,
+        motor_axis = None, encoder_zero = 0.0, T_motor_lidar = None, motor_errors = None,
         latency_rate = 0.0, latency_epoch = 0.0, ranges = [0.0; 2],
     ))]
     #[allow(clippy::too_many_arguments, reason = "the states by name")]
@@ -90,6 +110,7 @@ impl Globals {
         motor_axis: Option<[f64; 3]>,
         encoder_zero: f64,
         T_motor_lidar: Option<Transform>,
+        motor_errors: Option<Errors>,
         latency_rate: f64,
         latency_epoch: f64,
         ranges: [f64; 2],
@@ -103,6 +124,8 @@ impl Globals {
                     axis: axis.ok_or_else(zero_axis)?,
                     zero: finite_number("encoder_zero", encoder_zero)?,
                     T_motor_lidar: T.isometry("T_motor_lidar")?,
+                    errors: motor_errors
+                        .map_or_else(|| Ok(MotorErrors::default()), |e| e.checked())?,
                 })
             }
             _ => {
@@ -153,11 +176,12 @@ impl Globals {
             named.set_item("motor_axis", vector(py, &motor.axis))?;
             named.set_item("encoder_zero", motor.zero)?;
             named.set_item("T_motor_lidar", Transform::of(&motor.T_motor_lidar))?;
+            named.set_item("motor_errors", Errors::of(&motor.errors))?;
         }
         Ok(((Transform::of(&self.0.head.T_imu_base),), named))
     }
 
-    /// The correction (47,) that leads from `earlier` to these.
+    /// The correction (57,) that leads from `earlier` to these.
     fn moved_from(&self, earlier: &Self) -> [f64; N_GLOBALS] {
         self.0.moved_from(&earlier.0)
     }
@@ -240,6 +264,13 @@ impl Globals {
     #[getter]
     fn encoder_zero(&self) -> f64 {
         self.0.head.motor.map_or(0.0, |m| m.zero)
+    }
+
+    /// How the motor turns otherwise than its encoder reads, rad: `eccentricity` (2) and `wobble` (2, 4);
+    /// none without a motor.
+    #[getter]
+    fn motor_errors(&self) -> Option<Errors> {
+        self.0.head.motor.map(|m| Errors::of(&m.errors))
     }
 
     /// Translation of the lidar in the rotating motor frame, m; none without a motor.

@@ -111,7 +111,7 @@ impl Registration {
         Globals(self.0.globals.clone())
     }
 
-    /// Covariance (47, 47) of the slow states; zero where frozen.
+    /// Covariance (57, 57) of the slow states; zero where frozen.
     #[getter]
     fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let rows: Vec<[f64; N_GLOBALS]> = self
@@ -147,7 +147,7 @@ impl Registration {
         to_array2(py, &rows)
     }
 
-    /// Correction (47,) that leads from the prior's mean to `globals`.
+    /// Correction (57,) that leads from the prior's mean to `globals`.
     #[getter]
     fn offset(&self) -> [f64; N_GLOBALS] {
         self.0.offset
@@ -252,7 +252,7 @@ fn eigenvalues(sum: &Matrix3<f64>, weight: f64) -> [f64; 3] {
     bentwing_voxels::sym3::eigen(&(sum / weight.max(f64::MIN_POSITIVE))).values
 }
 
-/// A finite (47, 47) array as a matrix over the slow states.
+/// A finite (57, 57) array as a matrix over the slow states.
 pub(crate) fn global_matrix(
     name: &str,
     array: &PyReadonlyArray2<'_, f64>,

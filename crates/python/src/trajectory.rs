@@ -181,7 +181,7 @@ impl Samples {
         Ok((Self(trajectory, self.1.clone()), n_blind))
     }
 
-    /// These samples where a correction (47,) of the slow states moves them.
+    /// These samples where a correction (57,) of the slow states moves them.
     #[allow(
         clippy::large_types_passed_by_value,
         reason = "taken from Python as a whole"
@@ -192,7 +192,7 @@ impl Samples {
         Self(trajectory, self.1.clone())
     }
 
-    /// How samples follow the slow states (K, 6, 47): derivatives of their rotations, rad, and their
+    /// How samples follow the slow states (K, 6, 57): derivatives of their rotations, rad, and their
     /// translations, m, in the map.
     fn responses_at<'py>(
         &self,
@@ -226,7 +226,7 @@ impl Samples {
     }
 }
 
-/// An array (K, 6, 47) of responses.
+/// An array (K, 6, 57) of responses.
 fn response_array<'py>(
     py: Python<'py>,
     responses: &[PoseResponse],
@@ -235,7 +235,7 @@ fn response_array<'py>(
     flat.to_pyarray(py).reshape([responses.len(), 6, N_GLOBALS])
 }
 
-/// The responses in an array (K, 6, 47).
+/// The responses in an array (K, 6, 57).
 fn pose_responses(array: &PyReadonlyArray3<'_, f64>) -> PyResult<Vec<PoseResponse>> {
     let shape = array.shape();
     let flat = array.as_slice().ok().filter(|_| array.is_c_contiguous());

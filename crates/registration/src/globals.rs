@@ -3,11 +3,11 @@
 
 use std::ops::Range;
 
-use bentwing_trajectory::{Head, InertialUnit, so3};
+use bentwing_trajectory::{Head, InertialUnit, MotorErrors, so3};
 use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
 
 /// Number of global states.
-pub const N_GLOBALS: usize = 47;
+pub const N_GLOBALS: usize = 57;
 /// A vector of all global states or their corrections.
 pub type GlobalVector = [f64; N_GLOBALS];
 /// A matrix over all global states.
@@ -17,45 +17,61 @@ pub type GlobalMatrix = nalgebra::SMatrix<f64, N_GLOBALS, N_GLOBALS>;
 pub mod index {
     use std::ops::Range;
 
-    /// Those that place a surfel: rows of matches within a window concern no others.
-    pub const HEAD: Range<usize> = 0..15;
+    /// Those of a motor, which stand first: heads without one leave them out.
+    pub const MOTOR: Range<usize> = 0..15;
     /// Those that inertial samples depend on.
-    pub const INERTIAL: Range<usize> = 15..47;
+    pub const INERTIAL: Range<usize> = 25..57;
 
-    /// Lidar stamps minus IMU clock at the epoch of the lidar's clock, s.
-    pub const LATENCY: usize = 0;
-    /// How much faster than the IMU's clock the lidar's runs, s/s.
-    pub const LATENCY_RATE: usize = 1;
-    /// `R_imu_base ← Exp(θ) R_imu_base`, rad, imu frame.
-    pub const EXTRINSIC_ROTATION: Range<usize> = 2..5;
-    /// Translation of `T_imu_base`, m, imu frame.
-    pub const EXTRINSIC_TRANSLATION: Range<usize> = 5..8;
     /// Added to every encoder angle, rad.
-    pub const ENCODER_ZERO: usize = 8;
+    pub const ENCODER_ZERO: usize = 0;
     /// Rotation of the lidar about two axes perpendicular to the motor's, rad, motor frame.
-    pub const MOTOR_TILT: Range<usize> = 9..11;
+    pub const MOTOR_TILT: Range<usize> = 1..3;
     /// Translation of the lidar perpendicular to the motor's axis, m, motor frame.
-    pub const MOTOR_OFFSET: Range<usize> = 11..13;
+    pub const MOTOR_OFFSET: Range<usize> = 3..5;
+    /// Of the cosine and the sine of the encoder's angle, added to it, rad.
+    pub const ECCENTRICITY: Range<usize> = 5..7;
+    /// Of cosine and sine of the encoder's angle and of twice that: how the shaft leans about the first
+    /// axis across it, and about the second, rad.
+    pub const WOBBLE: Range<usize> = 7..15;
+    /// Lidar stamps minus IMU clock at the epoch of the lidar's clock, s.
+    pub const LATENCY: usize = 15;
+    /// How much faster than the IMU's clock the lidar's runs, s/s.
+    pub const LATENCY_RATE: usize = 16;
+    /// `R_imu_base ← Exp(θ) R_imu_base`, rad, imu frame.
+    pub const EXTRINSIC_ROTATION: Range<usize> = 17..20;
+    /// Translation of `T_imu_base`, m, imu frame.
+    pub const EXTRINSIC_TRANSLATION: Range<usize> = 20..23;
     /// By how much all ranges are too long, m.
-    pub const RANGE_OFFSET: usize = 13;
+    pub const RANGE_OFFSET: usize = 23;
     /// The same per `r tan θ`, rad.
-    pub const RANGE_GRAZING: usize = 14;
+    pub const RANGE_GRAZING: usize = 24;
     /// Gyro bias, rad/s.
-    pub const GYRO_BIAS: Range<usize> = 15..18;
+    pub const GYRO_BIAS: Range<usize> = 25..28;
     /// Accelerometer bias, m/s².
-    pub const ACCEL_BIAS: Range<usize> = 18..21;
+    pub const ACCEL_BIAS: Range<usize> = 28..31;
     /// Rotation of gravity about the x and y axes of the map, rad.
-    pub const GRAVITY: Range<usize> = 21..23;
+    pub const GRAVITY: Range<usize> = 31..33;
     /// Share of its rate that is added to each axis of the gyro.
-    pub const GYRO_SCALE: Range<usize> = 23..26;
+    pub const GYRO_SCALE: Range<usize> = 33..36;
     /// How axes of the gyro lean, rad: the pair across the main axis, and the main one to both.
-    pub const GYRO_MISALIGNMENT: Range<usize> = 26..29;
+    pub const GYRO_MISALIGNMENT: Range<usize> = 36..39;
     /// Row by row, rad/s per m/s².
-    pub const G_SENSITIVITY: Range<usize> = 29..38;
+    pub const G_SENSITIVITY: Range<usize> = 39..48;
     /// Share of its force that is added to each axis of the accelerometer.
-    pub const ACCEL_SCALE: Range<usize> = 38..41;
+    pub const ACCEL_SCALE: Range<usize> = 48..51;
     /// How axes of the accelerometer lean, rad: to y and z of x, x and z of y, x and y of z.
-    pub const ACCEL_MISALIGNMENT: Range<usize> = 41..47;
+    pub const ACCEL_MISALIGNMENT: Range<usize> = 51..57;
+
+    /// Those that a head with or without a motor has.
+    pub fn used(has_motor: bool) -> Range<usize> {
+        let first = if has_motor { MOTOR.start } else { MOTOR.end };
+        first..super::N_GLOBALS
+    }
+
+    /// Those of them that place a surfel: rows of matches within a window concern no others.
+    pub fn placing(has_motor: bool) -> Range<usize> {
+        used(has_motor).start..INERTIAL.start
+    }
 }
 
 /// Places of [`index::ACCEL_MISALIGNMENT`] in the matrix.
@@ -91,6 +107,7 @@ impl Globals {
         self.gravity = so3::exp(&Vector3::new(gx, gy, 0.0)) * self.gravity;
         if let Some(motor) = &mut head.motor {
             motor.zero += delta[index::ENCODER_ZERO];
+            correct_motor_errors(&mut motor.errors, delta);
             let [u, v] = so3::orthogonal_pair(&motor.axis);
             let pair = |r: Range<usize>| u * delta[r.start] + v * delta[r.start + 1];
             let lidar = &mut motor.T_motor_lidar;
@@ -126,6 +143,7 @@ impl Globals {
         delta[index::RANGE_GRAZING] = now.grazing - then.grazing;
         if let (Some(now), Some(then)) = (&self.head.motor, &earlier.head.motor) {
             delta[index::ENCODER_ZERO] = now.zero - then.zero;
+            motor_errors_moved(&now.errors, &then.errors, &mut delta);
             let (a, b) = (&now.T_motor_lidar, &then.T_motor_lidar);
             let (tilt, offset) = (turn(a.rotation, b.rotation), shift(a, b));
             for (k, u) in so3::orthogonal_pair(&now.axis).iter().enumerate() {
@@ -134,6 +152,33 @@ impl Globals {
             }
         }
         delta
+    }
+}
+
+fn correct_motor_errors(errors: &mut MotorErrors, delta: &GlobalVector) {
+    let of_turn = errors.eccentricity.iter_mut();
+    let of_lean = errors.wobble.as_flattened_mut().iter_mut();
+    let states = delta[index::ECCENTRICITY]
+        .iter()
+        .chain(&delta[index::WOBBLE]);
+    for (to, d) in of_turn.chain(of_lean).zip(states) {
+        *to += d;
+    }
+}
+
+/// Writes the errors of a motor into the correction that leads from `earlier` to `now`.
+fn motor_errors_moved(now: &MotorErrors, earlier: &MotorErrors, delta: &mut GlobalVector) {
+    let flat = |e: &MotorErrors| {
+        let wobble = e.wobble.as_flattened().iter();
+        e.eccentricity
+            .iter()
+            .chain(wobble)
+            .copied()
+            .collect::<Vec<_>>()
+    };
+    let states = index::ECCENTRICITY.chain(index::WOBBLE);
+    for ((g, a), b) in states.zip(flat(now)).zip(flat(earlier)) {
+        delta[g] = a - b;
     }
 }
 

@@ -145,7 +145,7 @@ impl WithSimd for Chunk<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bentwing_trajectory::{LidarClock, Motor, RangeBias};
+    use bentwing_trajectory::{LidarClock, Motor, MotorErrors, RangeBias};
     use nalgebra::Isometry3;
 
     #[test]
@@ -162,6 +162,10 @@ mod tests {
             axis: Vector3::y(),
             zero: 0.01,
             T_motor_lidar: Isometry3::new(Vector3::new(0.0, 0.1, 0.0), Vector3::x()),
+            errors: MotorErrors {
+                eccentricity: [0.01, 0.0],
+                wobble: [[0.01; 4]; 2],
+            },
         };
         let base = Isometry3::new(Vector3::new(0.3, 0.0, 0.1), Vector3::z());
         for motor in [None, Some(motor)] {

@@ -1,20 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The geometry of the sensor head: where the lidar is, seen from the IMU.
 
-use nalgebra::{Isometry3, Matrix3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, Vector3};
 
-use crate::{RangeBias, so3};
-
-/// A motor that turns the lidar: `T_imu_lidar(θ) = T_imu_motor · Rot(axis, θ + zero) · T_motor_lidar`.
-#[derive(Clone, Copy, Debug)]
-pub struct Motor {
-    /// Axis of rotation, unit vector, motor frame.
-    pub axis: Vector3<f64>,
-    /// Added to every encoder angle, rad.
-    pub zero: f64,
-    /// Lidar in the rotating motor frame.
-    pub T_motor_lidar: Isometry3<f64>,
-}
+use crate::{Motor, RangeBias, so3};
 
 /// The lidar's clock: what is stamped t was measured at `t - latency - rate · (t - epoch)`.
 #[derive(Clone, Copy, Debug, Default)]
@@ -66,7 +55,7 @@ impl Head {
         let base = self.T_imu_base;
         let T = match &self.motor {
             None => base,
-            Some(m) => base * turn(m, theta) * m.T_motor_lidar,
+            Some(m) => base * m.turn(theta) * m.T_motor_lidar,
         };
         (so3::matrix(&T.rotation), T.translation.vector)
     }
@@ -78,7 +67,7 @@ impl Head {
         match &self.motor {
             None => p,
             Some(m) => {
-                (turn(m, theta) * m.T_motor_lidar)
+                (m.turn(theta) * m.T_motor_lidar)
                     .transform_point(&p.into())
                     .coords
             }
@@ -91,13 +80,10 @@ impl Head {
     }
 }
 
-fn turn(motor: &Motor, theta: f64) -> UnitQuaternion<f64> {
-    so3::exp(&(motor.axis * (theta + motor.zero)))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::MotorErrors;
 
     #[test]
     fn a_fast_clock_is_later_and_later() {
@@ -119,6 +105,7 @@ mod tests {
                 axis: Vector3::z(),
                 zero: 0.25,
                 T_motor_lidar: Isometry3::translation(0.1, 0.0, 0.0),
+                errors: MotorErrors::default(),
             }),
             ranges: RangeBias::default(),
         };

@@ -5,6 +5,7 @@
 mod correction_spline;
 mod head;
 mod imu;
+mod motor;
 mod propagation;
 mod range_bias;
 mod samples;
@@ -13,8 +14,9 @@ pub mod so3;
 mod unit;
 
 pub use correction_spline::{Basis, CorrectionSpline, StencilWeights};
-pub use head::{Head, LidarClock, Motor};
+pub use head::{Head, LidarClock};
 pub use imu::{Imu, Increment, NodeForce};
+pub use motor::{Motor, MotorErrors};
 pub use propagation::{extend_constant_velocity, extend_inertial};
 pub use range_bias::{RangeBias, Sight};
 pub use samples::{Pose, Trajectory, TrajectoryError};

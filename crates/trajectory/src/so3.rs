@@ -68,6 +68,13 @@ pub fn right_jacobian_inverse(phi: &Vector3<f64>) -> Matrix3<f64> {
     Matrix3::identity() + 0.5 * h + log_coefficient(phi.norm()) * h * h
 }
 
+/// The right Jacobian, `exp(phi + δ) ≈ exp(phi) · exp(J δ)`, of rotations of some degrees at most: what
+/// its series leaves out is below `|phi|⁵ / 720`.
+pub fn right_jacobian_of_small(phi: &Vector3<f64>) -> Matrix3<f64> {
+    let (h, square) = (hat(phi), phi.norm_squared());
+    Matrix3::identity() - h * (0.5 - square / 24.0) + h * h * (1.0 / 6.0 - square / 120.0)
+}
+
 /// `(1 − ½θ cot ½θ)/θ²`, the factor of `φ×(φ×·)` in the inverses of the group's Jacobians.
 pub(crate) fn log_coefficient(angle: f64) -> f64 {
     if angle < 1e-3 {
@@ -120,6 +127,12 @@ mod tests {
             let numeric = (forward - backward) / (2.0 * h);
             let analytic = right_jacobian_inverse(&phi) * d;
             prop_assert!((numeric - analytic).norm() < 1e-8 * (1.0 + analytic.norm()));
+        }
+
+        #[test]
+        fn right_jacobian_of_small_is_the_inverse_of_the_inverse(phi in vector(0.05)) {
+            let product = right_jacobian_of_small(&phi) * right_jacobian_inverse(&phi);
+            prop_assert!((product - Matrix3::identity()).norm() < 1e-8);
         }
 
         #[test]

@@ -153,6 +153,14 @@ def compose(
     return rotate(quat, points) + translation
 
 
+def orthogonal_pair(axis: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return two unit vectors (2, 3) that complete a unit vector to a right-handed frame, as the core does."""
+    away = np.array([1.0, 0.0, 0.0] if abs(axis[0]) < 0.6 else [0.0, 1.0, 0.0])
+    first = np.cross(axis, away)
+    first /= np.linalg.norm(first)
+    return np.stack([first, np.cross(axis, first)])
+
+
 def _positive(quats: NDArray[np.float64]) -> NDArray[np.float64]:
     """Of the two quaternions of each rotation, the one with w >= 0."""
     return np.where(quats[..., 3:] < 0, -quats, quats)

@@ -7,7 +7,7 @@ be pasted from the one to the other.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -82,10 +82,48 @@ class FixedMount(Value):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class MotorErrors(Value):
+    """How a motor turns otherwise than its encoder reads, by the angle θ that it reads.
+
+    Attributes
+    ----------
+    eccentricity : (2,) rad; `eccentricity · (cos θ, sin θ)` is added to the angle: the encoder's disc is
+        off its axis
+    wobble : (2, 4) rad; `wobble · (cos θ, sin θ, cos 2θ, sin 2θ)` is how far the shaft leans about the
+        two axes across it, motor frame
+    """
+
+    eccentricity: NDArray[np.float64] = field(default_factory=lambda: np.zeros(2))
+    wobble: NDArray[np.float64] = field(default_factory=lambda: np.zeros((2, 4)))
+
+    def added(self, angles: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return what the eccentricity adds to angles (N,), rad."""
+        return np.asarray(_harmonics(angles)[..., :2] @ self.eccentricity)
+
+    def lean(self, axis: NDArray[np.float64], angle: float) -> NDArray[np.float64]:
+        """Return how the shaft leans (3,), a rotation vector, rad, motor frame."""
+        return np.asarray(
+            _harmonics(np.array(angle)) @ self.wobble.T @ geometry.orthogonal_pair(axis)
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the errors as payload.yaml has them; nothing where there are none."""
+        named = {"eccentricity": self.eccentricity, "wobble": self.wobble}
+        return {name: values.tolist() for name, values in named.items() if values.any()}
+
+    @classmethod
+    def from_json(cls, encoder: Mapping[str, Any]) -> MotorErrors:
+        """Read what `to_json` wrote."""
+        named = ("eccentricity", "wobble")
+        return cls(**{name: np.array(encoder[name], float) for name in named if name in encoder})
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class MotorMount(Value):
     """A lidar turned by a motor, whose encoder reads θ.
 
-    `T_imu_lidar(θ) = T_imu_motor · Rot(axis, θ + encoder_zero) · T_motor_lidar`
+    `T_imu_lidar(θ) = T_imu_motor · Exp(lean(θ)) · Rot(axis, θ + encoder_zero + added(θ)) · T_motor_lidar`,
+    with what `errors` say of θ.
 
     Attributes
     ----------
@@ -93,16 +131,20 @@ class MotorMount(Value):
     axis : (3,) float64, unit, motor frame
     encoder_zero : rad
     T_motor_lidar : the lidar in the rotating motor frame
+    errors : how it turns otherwise than its encoder reads
     """
 
     T_imu_motor: Pose
     axis: NDArray[np.float64]
     encoder_zero: float
     T_motor_lidar: Pose
+    errors: MotorErrors = field(default_factory=MotorErrors)
 
     def lidar_at(self, angle: float) -> Pose:
         """Return `T_imu_lidar` where the encoder reads `angle`, rad."""
-        return self.T_imu_motor @ self._turn(angle + self.encoder_zero) @ self.T_motor_lidar
+        turned = angle + self.encoder_zero + float(self.errors.added(np.array(angle)))
+        lean = Pose(np.zeros(3), geometry.exp(self.errors.lean(self.axis, angle)))
+        return self.T_imu_motor @ lean @ self._turn(turned) @ self.T_motor_lidar
 
     def with_zero_behind_motor(self) -> MotorMount:
         """Return the same mount with the encoder's zero as a turn of the lidar about the axis."""
@@ -118,6 +160,7 @@ class MotorMount(Value):
             "zero": float(self.encoder_zero),
             "T_imu_motor": self.T_imu_motor.to_json(),
             "T_motor_lidar": self.T_motor_lidar.to_json(),
+            **self.errors.to_json(),
         }
         return {"encoder": encoder}
 
@@ -138,4 +181,12 @@ def mount_from_json(described: Mapping[str, Any]) -> Mount:
         np.array(encoder["axis"], float),
         encoder["zero" if "zero" in encoder else "encoder_zero"],
         Pose.from_json(encoder["T_motor_lidar"]),
+        MotorErrors.from_json(encoder),
+    )
+
+
+def _harmonics(angles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Cosine and sine of angles, and of twice the angles (..., 4)."""
+    return np.stack(
+        [np.cos(angles), np.sin(angles), np.cos(2 * angles), np.sin(2 * angles)], axis=-1
     )

@@ -124,10 +124,12 @@ def with_motion(payload: Payload, found: Calibration) -> Payload:
                 "T_imu_motor": _transform(mount.T_imu_motor),
                 "zero": round(mount.encoder_zero, DIGITS),
                 "T_motor_lidar": _transform(mount.T_motor_lidar),
+                "eccentricity": _rounded(mount.errors.eccentricity),
+                "wobble": tuple(_rounded(row) for row in mount.errors.wobble),
             }
         )
         names += [n for n in ("motor_tilt", "motor_offset") if n not in known.std]
-        names.append("encoder_zero")
+        names += ["encoder_zero", "encoder_eccentricity", "motor_wobble"]
     std = {**known.std, **{n: _rounded(found.std[n]) for n in names if n in found.std}}
     unseen = tuple(s for s in known.not_observable if s != NO_MOTION)
     update["calibration"] = known.model_copy(update={"std": std, "not_observable": unseen})

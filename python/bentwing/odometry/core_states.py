@@ -10,7 +10,7 @@ import numpy as np
 
 from bentwing import _core
 from bentwing.base.inertial_unit import InertialUnit
-from bentwing.base.mount import FixedMount, MotorMount, Mount, Pose
+from bentwing.base.mount import FixedMount, MotorErrors, MotorMount, Mount, Pose
 from bentwing.base.range_bias import RangeBias
 
 if TYPE_CHECKING:
@@ -38,6 +38,7 @@ def core_globals(calibration: Calibration) -> _core.Globals:
         motor_axis=mount.axis,
         encoder_zero=mount.encoder_zero,
         T_motor_lidar=core_pose(mount.T_motor_lidar),
+        motor_errors=(mount.errors.eccentricity.tolist(), mount.errors.wobble.tolist()),
     )
 
 
@@ -67,9 +68,12 @@ def _refined_mount(described: Mount, slow: _core.Globals) -> Mount:
     """Return the mount with the transforms of the slow states; a motor keeps its axis."""
     base = Pose(slow.base_translation, slow.base_quat_xyzw)
     translation, quat = slow.motor_lidar_translation, slow.motor_lidar_quat_xyzw
-    if isinstance(described, FixedMount) or translation is None or quat is None:
+    errors = slow.motor_errors
+    if isinstance(described, FixedMount) or translation is None or quat is None or errors is None:
         return FixedMount(base)
-    return MotorMount(base, described.axis, slow.encoder_zero, Pose(translation, quat))
+    eccentricity, wobble = (np.array(values) for values in errors)
+    lidar, turns = Pose(translation, quat), MotorErrors(eccentricity, wobble)
+    return MotorMount(base, described.axis, slow.encoder_zero, lidar, turns)
 
 
 def core_samples(trajectory: Trajectory) -> _core.Samples:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bentwing.base.calibration import STANDARD_GRAVITY, Calibration
-from bentwing.base.mount import FixedMount, MotorMount, Pose
+from bentwing.base.mount import FixedMount, MotorErrors, MotorMount, Pose
 from bentwing.base.range_bias import RangeBias
 
 if TYPE_CHECKING:
@@ -27,6 +27,7 @@ def described_mount(payload: Payload) -> Mount:
         axis=np.array(encoder.axis),
         encoder_zero=encoder.zero,
         T_motor_lidar=encoder.T_motor_lidar.pose,
+        errors=MotorErrors(np.array(encoder.eccentricity), np.array(encoder.wobble)),
     )
 
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
     from bentwing.base.inertial_unit import InertialUnit
-    from bentwing.base.mount import Mount, Pose
+    from bentwing.base.mount import MotorErrors, Mount, Pose
     from bentwing.base.range_bias import RangeBias
 
 DEGREES = 180 / np.pi
@@ -89,6 +89,20 @@ def _mount_rows(mount: Mount, std: Mapping[str, list[float]]) -> list[tuple[str,
         *_pose_rows("motor in IMU", mount.T_imu_motor, *base_std),
         _row("encoder zero, °", [mount.encoder_zero], std.get("encoder_zero"), DEGREES, 3),
         *_pose_rows("lidar in motor", mount.T_motor_lidar, *motor_std),
+        *_error_rows(mount.errors, std),
+    ]
+
+
+def _error_rows(errors: MotorErrors, std: Mapping[str, list[float]]) -> list[tuple[str, str, str]]:
+    """How the motor turns otherwise than its encoder reads."""
+    rows = (
+        ("encoder eccentricity, ° (cosine, sine)", errors.eccentricity, "encoder_eccentricity"),
+        ("motor wobble, ° (cosine, sine, once and twice a turn, two axes)", errors.wobble.ravel(), "motor_wobble"),
+    )  # fmt: skip
+    return [
+        _row(name, values, std.get(state), DEGREES, 3)
+        for name, values, state in rows
+        if values.any()
     ]
 
 

@@ -7,17 +7,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bentwing import _core
 from bentwing.base import geometry
 from bentwing.base.calibration import Calibration
 from bentwing.base.inertial_unit import InertialUnit
-from bentwing.base.mount import FixedMount, MotorMount, Pose
+from bentwing.base.mount import FixedMount, MotorErrors, MotorMount, Pose
 from bentwing.base.plain import plain
 from bentwing.base.range_bias import RangeBias
+from bentwing.odometry.core_states import core_globals
 
 POSE = Pose(np.array([0.03, -0.01, 0.05]), geometry.exp(np.array([0.1, -0.2, 0.3])))
 BEHIND = Pose(np.array([0.0, 0.02, -0.07]), geometry.exp(np.array([1.5, 0.1, 0.0])))
 MOTOR = MotorMount(POSE, np.array([0.0, 0.6, 0.8]), 0.25, BEHIND)
-MOUNTS = [FixedMount(POSE), MOTOR]
+WOBBLE = 1e-3 * np.arange(-3.0, 5.0).reshape(2, 4)
+ASKEW = replace(MOTOR, errors=MotorErrors(np.array([2e-3, -1e-3]), WOBBLE))
+MOUNTS = [FixedMount(POSE), MOTOR, ASKEW]
 
 
 def calibration(mount):
@@ -50,7 +54,7 @@ def test_a_calibration_in_the_run_json_of_an_earlier_version_is_read():
         "encoder_zero": 0.25,
         "T_motor_lidar": earlier(BEHIND),
     }
-    for old, mount in zip([{"T_imu_lidar": earlier(POSE)}, motor], MOUNTS, strict=True):
+    for old, mount in zip([{"T_imu_lidar": earlier(POSE)}, motor], MOUNTS[:2], strict=True):
         now = calibration(mount).to_json()
         without = {k: v for k, v in now.items() if k not in {"latency_left", "latency_read"}}
         assert Calibration.from_json({**without, "mount": old}).to_json() == now
@@ -65,11 +69,12 @@ def test_a_unit_is_read_from_json_bit_for_bit_and_one_of_an_earlier_version_is_p
     assert Calibration.from_json(written).unit == InertialUnit()
 
 
-def test_a_zero_behind_the_motor_leaves_the_lidar_where_it_is():
-    moved = MOTOR.with_zero_behind_motor()
+@pytest.mark.parametrize("mount", [MOTOR, ASKEW])
+def test_a_zero_behind_the_motor_leaves_the_lidar_where_it_is(mount):
+    moved = mount.with_zero_behind_motor()
     assert moved.encoder_zero == 0.0
     for angle in (-2.0, 0.0, 0.7):
-        expected, found = MOTOR.lidar_at(angle), moved.lidar_at(angle)
+        expected, found = mount.lidar_at(angle), moved.lidar_at(angle)
         np.testing.assert_allclose(found.matrix, expected.matrix, rtol=0, atol=1e-15)
 
 
@@ -78,6 +83,19 @@ def test_the_lidar_is_behind_the_motor_at_the_angle_beyond_the_zero():
     turn[:3, :3] = geometry.to_matrices(geometry.exp(MOTOR.axis * (0.5 + 0.25)))
     expected = POSE.matrix @ turn @ BEHIND.matrix
     np.testing.assert_allclose(MOTOR.lidar_at(0.5).matrix, expected, rtol=0, atol=1e-15)
+
+
+def test_a_motor_that_leans_and_whose_encoder_errs_turns_the_lidar_as_the_core_says():
+    at_rest = _core.Samples(0.0, 1.0, np.zeros((2, 3)), np.tile([0.0, 0.0, 0.0, 1.0], (2, 1)))
+    slow = core_globals(calibration(ASKEW))
+    points = np.vstack([np.zeros(3), np.eye(3)])
+    for angle in (-2.0, 0.0, 0.7):
+        times, angles = np.full(4, 0.5), np.full(4, angle)
+        placed = at_rest.place(points, times, angles, slow, threads=1)
+        pose = ASKEW.lidar_at(angle)
+        expected = points @ pose.R.T + pose.translation
+        np.testing.assert_allclose(placed, expected, rtol=0, atol=1e-12)
+        assert np.abs(pose.R - MOTOR.lidar_at(angle).R).max() > 1e-3
 
 
 ZERO = np.zeros(3)

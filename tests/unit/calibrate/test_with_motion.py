@@ -3,8 +3,10 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from bentwing.base.mount import MotorErrors
 from bentwing.base.range_bias import RangeBias
 from bentwing.calibrate.outcome import with_motion
 from bentwing.recording import Payload
@@ -29,3 +31,14 @@ def test_ranges_that_do_not_show_are_left_as_they_were_described():
     assert with_motion(PAYLOAD, flown(PAYLOAD, RangeBias())).lidar.ranges is None
     known = Payload.model_validate({**PAYLOAD.model_dump(), "lidar": {"ranges": {"offset": 0.01}}})
     assert with_motion(known, flown(known, RangeBias(0.01))).lidar.ranges == known.lidar.ranges
+
+
+def test_how_a_motor_turns_is_written_with_its_deviation_and_read_back(tmp_path):
+    payload = Payload.model_validate({"imu": {}, "encoder": {"T_imu_motor": {}}})
+    drawn = flown(payload, RangeBias(), motor_wobble=[1e-5] * 8)
+    errors = MotorErrors(np.array([1e-3, -2e-3]), 1e-4 * np.arange(8.0).reshape(2, 4))
+    found = replace(drawn, mount=replace(drawn.mount, errors=errors))
+    with_motion(payload, found).save(tmp_path / "payload.yaml")
+    again = Payload.load(tmp_path / "payload.yaml")
+    assert described_calibration(again).mount == found.mount
+    assert again.calibration.std["motor_wobble"] == (1e-5,) * 8

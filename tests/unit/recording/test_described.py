@@ -2,13 +2,14 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import yaml
 
 from bentwing.base.calibration import Calibration
-from bentwing.base.mount import FixedMount, MotorMount, Pose
+from bentwing.base.mount import FixedMount, MotorErrors, MotorMount, Pose
 from bentwing.base.plain import plain
 from bentwing.base.range_bias import RangeBias
 from bentwing.recording import Payload
@@ -18,9 +19,11 @@ POSE = Pose(np.array([0.03, -0.01, 0.05]), np.array([0.5, -0.5, 0.5, 0.5]))
 BEHIND = Pose(np.array([0.0, 0.02, -0.07]), np.array([0.0, 0.6, 0.0, 0.8]))
 
 
-@pytest.mark.parametrize(
-    "mount", [FixedMount(POSE), MotorMount(POSE, np.array([0.0, 0.6, 0.8]), -0.25, BEHIND)]
-)
+MOTOR = MotorMount(POSE, np.array([0.0, 0.6, 0.8]), -0.25, BEHIND)
+ASKEW = MotorErrors(np.array([1e-3, 0.0]), 1e-3 * np.arange(8.0).reshape(2, 4))
+
+
+@pytest.mark.parametrize("mount", [FixedMount(POSE), MOTOR, replace(MOTOR, errors=ASKEW)])
 def test_a_mount_from_run_json_can_be_pasted_into_a_payload(tmp_path, mount):
     none = np.zeros(3)
     run = json.loads(json.dumps(plain(Calibration(0.004, mount, none, none, none))))

@@ -146,6 +146,18 @@ def test_a_motor_mount_is_shown_with_its_three_parts():
     html = calibration_table({**RECORD["calibration"], "mount": {"encoder": encoder}, "std": std})
     for text in ("motor in IMU", "encoder zero", "0.573", "± 0.006", "lidar in motor", "± 2.0"):
         assert text in html, text
+    assert "wobble" not in html
+
+
+def test_how_a_motor_turns_otherwise_than_its_encoder_reads_is_shown():
+    pose = {"translation": [0.01, 0.0, 0.05], "quaternion": [0.0, 0.0, 0.0, 1.0]}
+    encoder = {"T_imu_motor": pose, "axis": [0, 0, 1], "zero": 0.01, "T_motor_lidar": pose}
+    errors = {"eccentricity": [1e-3, -2e-3], "wobble": [[0.0, 0.0, 5e-4, 0.0], [0.0] * 4]}
+    std = {"encoder_eccentricity": [1e-4, 2e-4], "motor_wobble": [1e-5] * 8}
+    mount = {"encoder": encoder | errors}
+    html = calibration_table({**RECORD["calibration"], "mount": mount, "std": std})
+    for text in ("encoder eccentricity", "0.057", "-0.115", "± 0.011", "motor wobble", "0.029"):
+        assert text in html, text
 
 
 def test_what_the_inertial_unit_does_wrong_is_shown_where_it_was_estimated():

@@ -6,7 +6,7 @@
     reason = "only what is inlined into a dispatched function uses the machine's instructions"
 )]
 
-use bentwing_trajectory::{Head, so3};
+use bentwing_trajectory::{Head, Motor, MotorErrors, so3};
 use bentwing_voxels::sym3;
 use nalgebra::{Matrix3, Vector3};
 
@@ -74,10 +74,11 @@ pub fn write_knots(knots: &mut [f64], surfel: &PlacedSurfel, n: &Vector3<f64>, s
     }
 }
 
-/// Adds `sign · ∂(nᵀ μ)/∂(global states)`.
+/// Adds `sign · ∂(nᵀ μ)/∂(global states)` to the entries of the states from the `first` one on.
 #[inline(always)]
 pub fn add_globals(
     globals: &mut [f64],
+    first: usize,
     head: &Head,
     surfel: &PlacedSurfel,
     n: &Vector3<f64>,
@@ -87,26 +88,55 @@ pub fn add_globals(
     let turned = surfel.R_map_imu.tr_mul(&surfel.lever) - head.T_imu_base.translation.vector;
     // The surfel is looked up at stamp − latency: a larger latency moves it back along its path.
     let passed = sign * n.dot(&surfel.velocity);
-    globals[index::LATENCY] -= passed;
-    globals[index::LATENCY_RATE] -= passed * surfel.clock_age;
+    globals[index::LATENCY - first] -= passed;
+    globals[index::LATENCY_RATE - first] -= passed * surfel.clock_age;
     let rotation = turned.cross(&n_imu);
     for c in 0..3 {
-        globals[index::EXTRINSIC_ROTATION.start + c] += sign * rotation[c];
-        globals[index::EXTRINSIC_TRANSLATION.start + c] += sign * n_imu[c];
+        globals[index::EXTRINSIC_ROTATION.start - first + c] += sign * rotation[c];
+        globals[index::EXTRINSIC_TRANSLATION.start - first + c] += sign * n_imu[c];
     }
     let nearer = -sign * n.dot(&surfel.sight.ray);
-    globals[index::RANGE_OFFSET] += nearer;
-    globals[index::RANGE_GRAZING] += nearer * surfel.sight.slant;
+    globals[index::RANGE_OFFSET - first] += nearer;
+    globals[index::RANGE_GRAZING - first] += nearer * surfel.sight.slant;
     if let Some(motor) = &head.motor {
-        let n_base = head.T_imu_base.rotation.inverse() * n_imu;
-        let p_base = head.T_imu_base.rotation.inverse() * turned;
-        globals[index::ENCODER_ZERO] += sign * n_base.dot(&motor.axis.cross(&p_base));
-        let n_rotor = so3::exp(&(motor.axis * -(surfel.angle + motor.zero))) * n_base;
-        let arm = motor.T_motor_lidar.rotation * surfel.mean_lidar;
-        for (k, u) in so3::orthogonal_pair(&motor.axis).iter().enumerate() {
-            globals[index::MOTOR_TILT.start + k] += sign * n_rotor.dot(&u.cross(&arm));
-            globals[index::MOTOR_OFFSET.start + k] += sign * n_rotor.dot(u);
+        let to_base = head.T_imu_base.rotation.inverse();
+        let (n_base, p_base) = (to_base * n_imu, to_base * turned);
+        let globals = &mut globals[index::MOTOR.start - first..];
+        add_motor(globals, motor, surfel, &n_base, &p_base, sign);
+    }
+}
+
+/// The same of the states of a motor, with normal and mean in its frame before it turns.
+#[inline(always)]
+fn add_motor(
+    globals: &mut [f64],
+    motor: &Motor,
+    surfel: &PlacedSurfel,
+    n_base: &Vector3<f64>,
+    p_base: &Vector3<f64>,
+    sign: f64,
+) {
+    // Seen from the shaft as it leans.
+    let lean = motor.lean(surfel.angle);
+    let upright = so3::exp(&-lean);
+    let (n, p) = (upright * n_base, upright * p_base);
+    let of_turn = MotorErrors::harmonics(surfel.angle);
+    let by_angle = sign * n.dot(&motor.axis.cross(&p));
+    globals[index::ENCODER_ZERO] += by_angle;
+    for (k, h) in of_turn[..2].iter().enumerate() {
+        globals[index::ECCENTRICITY.start + k] += by_angle * h;
+    }
+    // Of `Exp(lean + δ) ≈ Exp(lean) Exp(J δ)` the way of the mean along the normal is `(Jᵀ (p × n)) · δ`.
+    let by_lean = so3::right_jacobian_of_small(&lean).tr_mul(&p.cross(&n));
+    let n_rotor = motor.spin(surfel.angle).inverse() * n;
+    let arm = motor.T_motor_lidar.rotation * surfel.mean_lidar;
+    for (k, u) in so3::orthogonal_pair(&motor.axis).iter().enumerate() {
+        let size = sign * u.dot(&by_lean);
+        for (i, h) in of_turn.iter().enumerate() {
+            globals[index::WOBBLE.start + 4 * k + i] += size * h;
         }
+        globals[index::MOTOR_TILT.start + k] += sign * n_rotor.dot(&u.cross(&arm));
+        globals[index::MOTOR_OFFSET.start + k] += sign * n_rotor.dot(u);
     }
 }
 
@@ -144,7 +174,7 @@ mod tests {
             let first = surfel.basis.first;
             let mut group = RowGroup::new(first..first + 4);
             write_knots(group.knots_mut(), &surfel, &n, 1.0);
-            add_globals(group.globals_mut(), &scene.globals.head, &surfel, &n, 1.0);
+            add_globals(group.globals_mut(), 0, &scene.globals.head, &surfel, &n, 1.0);
             assert_row(&scene, &group, |controls, globals| {
                 let moved = place(&set, i, &scene.trajectory, globals);
                 let d = spline.evaluate(controls, surfel.time);

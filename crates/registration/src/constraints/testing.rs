@@ -3,7 +3,8 @@
 
 use bentwing_surfels::SurfelSet;
 use bentwing_trajectory::{
-    CorrectionSpline, Head, InertialUnit, LidarClock, Motor, RangeBias, Trajectory, so3,
+    CorrectionSpline, Head, InertialUnit, LidarClock, Motor, MotorErrors, RangeBias, Trajectory,
+    so3,
 };
 use nalgebra::{Isometry3, Matrix3, Vector3};
 use proptest::prelude::*;
@@ -72,6 +73,10 @@ impl Scene {
                         axis: axis.try_normalize(1e-3).unwrap_or_else(Vector3::z),
                         zero: 0.4,
                         T_motor_lidar: Isometry3::new(Vector3::new(0.05, 0.1, -0.02), mount),
+                        errors: MotorErrors {
+                            eccentricity: [0.01, -0.02],
+                            wobble: [[0.01, -0.02, 0.004, 0.01], [0.005, 0.01, -0.01, 0.02]],
+                        },
                     };
                     let head = Head {
                         T_imu_base: Isometry3::new(Vector3::new(0.1, -0.2, 0.05), extrinsic),

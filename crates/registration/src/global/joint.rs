@@ -5,6 +5,8 @@
 //! they were control points: the system is one sparse matrix of 6×6 blocks, whatever the number of
 //! pieces, and the solver's order keeps its fill low.
 
+use std::ops::Range;
+
 use crate::state::State;
 use crate::system::normal_equations::Block;
 use crate::system::solve::Factorized;
@@ -12,8 +14,12 @@ use crate::{GlobalMatrix, N_GLOBALS, NormalEquations, Solution, index};
 
 /// Control points that the global states of a piece fill.
 pub const N_STAND_INS: usize = N_GLOBALS.div_ceil(6);
-/// The first ones, with the states that matches concern.
-pub const N_HEAD_STAND_INS: usize = index::HEAD.end.div_ceil(6);
+
+/// Those of them with the states that matches concern.
+pub fn placing_stand_ins(has_motor: bool) -> Range<usize> {
+    let states = index::placing(has_motor);
+    states.start / 6..states.end.div_ceil(6)
+}
 
 /// Where the unknowns of each piece stand.
 pub struct Joint {

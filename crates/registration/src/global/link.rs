@@ -6,12 +6,14 @@
     reason = "only what is inlined into a dispatched function uses the machine's instructions"
 )]
 
+use std::ops::Range;
+
 use bentwing_voxels::{VoxelKey, voxel_of};
 use pulp::{Simd, WithSimd};
 
 use super::bend;
 use super::chunk::Laid;
-use super::joint::{Joint, N_HEAD_STAND_INS};
+use super::joint::{Joint, placing_stand_ins};
 use super::scatter::Pulls;
 use crate::constraints::surfel_match::{self, MatchPlane};
 use crate::neighbors::{Search, claimed_pairs};
@@ -113,7 +115,7 @@ struct Places {
 }
 
 impl Places {
-    fn new(link: &Link, laid: [&Laid; 2], joint: &Joint) -> Self {
+    fn new(link: &Link, laid: [&Laid; 2], joint: &Joint, stand_ins: Range<usize>) -> Self {
         let [(a, a_end), (b, b_end)] = laid.map(range);
         let [p, q] = link.pieces;
         let mut controls: Vec<usize>;
@@ -132,7 +134,7 @@ impl Places {
         }
         let stand_in = (p != q).then_some(controls.len());
         if p != q {
-            controls.extend((0..N_HEAD_STAND_INS).map(|s| joint.stand_in(q) + s));
+            controls.extend(stand_ins.map(|s| joint.stand_in(q) + s));
         }
         Self {
             first,
@@ -191,9 +193,10 @@ impl WithSimd for LinkSum<'_> {
 impl LinkSum<'_> {
     #[inline(always)]
     fn sum(&self) -> LinkEquations {
-        let places = Places::new(self.link, self.laid, self.joint);
+        let (states, held) = (index::placing(self.has_motor()), self.stand_ins());
+        let places = Places::new(self.link, self.laid, self.joint, held.clone());
         let mut equations = NormalEquations::new(places.controls.len());
-        let (mut rows, mut health) = (RowGroup::of([], index::HEAD), Health::default());
+        let (mut rows, mut health) = (RowGroup::of([], states.clone()), Health::default());
         let group = |m: &LinkMatch| {
             let [s, t] = self.surfels(m);
             (places.of_first(s), places.of_second(t))
@@ -202,12 +205,9 @@ impl LinkSum<'_> {
         ordered.sort_by_key(|&(group, _)| group);
         for of_group in ordered.chunk_by(|a, b| a.0 == b.0) {
             let (first, second) = of_group[0].0;
-            let stand_ins = places
-                .stand_in
-                .into_iter()
-                .flat_map(|s| s..s + N_HEAD_STAND_INS);
+            let stand_ins = places.stand_in.into_iter().flat_map(|s| s..s + held.len());
             let controls = (first..first + 4).chain(second..second + 4);
-            rows.reset(controls.chain(stand_ins), index::HEAD);
+            rows.reset(controls.chain(stand_ins), states.clone());
             for (_, m) in of_group {
                 self.add_row(m, &mut rows, &mut health);
             }
@@ -223,6 +223,17 @@ impl LinkSum<'_> {
             controls: places.controls,
             health,
         }
+    }
+
+    /// Whether a lidar of the two is turned by a motor.
+    fn has_motor(&self) -> bool {
+        let mut pieces = self.link.pieces.into_iter();
+        pieces.any(|p| self.states[p].globals.head.motor.is_some())
+    }
+
+    /// The stand-ins, of those of a piece, with the states that its matches concern.
+    fn stand_ins(&self) -> Range<usize> {
+        placing_stand_ins(self.has_motor())
     }
 
     /// What the matches pull at each control point, patch by patch of the coarsest voxels.
@@ -266,16 +277,24 @@ impl LinkSum<'_> {
         let [surfel, other] = self.surfels(m);
         let heads = self.link.pieces.map(|p| &self.states[p].globals.head);
         let n = &m.plane.normal(surfel);
+        let first = rows.first_global();
         rows.globals_mut().fill(0.0);
         surfel_match::write_knots(&mut rows.knots_mut()[..24], surfel, n, 1.0);
-        surfel_match::add_globals(rows.globals_mut(), heads[0], surfel, n, 1.0);
+        surfel_match::add_globals(rows.globals_mut(), first, heads[0], surfel, n, 1.0);
         surfel_match::write_knots(&mut rows.knots_mut()[24..48], other, n, -1.0);
         if self.link.pieces[0] == self.link.pieces[1] {
-            surfel_match::add_globals(rows.globals_mut(), heads[1], other, n, -1.0);
+            surfel_match::add_globals(rows.globals_mut(), first, heads[1], other, n, -1.0);
         } else {
             let stand_ins = &mut rows.knots_mut()[48..];
             stand_ins.fill(0.0);
-            surfel_match::add_globals(stand_ins, heads[1], other, n, -1.0);
+            surfel_match::add_globals(
+                stand_ins,
+                6 * self.stand_ins().start,
+                heads[1],
+                other,
+                n,
+                -1.0,
+            );
         }
         let residual = n.dot(&(surfel.mean - other.mean)) + m.offset;
         let x = residual * m.plane.information.sqrt();

@@ -241,8 +241,9 @@ fn a_second_piece_with_its_own_latency_joins_the_first() -> Result<(), SolveErro
         &trajectory(40.0, 60.0, |_| Vector3::zeros()),
     );
     assert!(left < 2e-3, "{left} m between the pieces");
-    assert!(found.pieces[1].covariance[(0, 0)] > 0.0);
-    assert!(found.pieces[0].covariance[(0, 0)] == 0.0);
+    let of_latency = (index::LATENCY, index::LATENCY);
+    assert!(found.pieces[1].covariance[of_latency] > 0.0);
+    assert!(found.pieces[0].covariance[of_latency] == 0.0);
     Ok(())
 }
 

@@ -53,6 +53,8 @@ impl Layout {
             index::ENCODER_ZERO => "encoder zero",
             i if index::MOTOR_TILT.contains(&i) => "motor tilt",
             i if index::MOTOR_OFFSET.contains(&i) => "motor offset",
+            i if index::ECCENTRICITY.contains(&i) => "eccentricity of the encoder",
+            i if index::WOBBLE.contains(&i) => "wobble of the motor's shaft",
             i if index::GYRO_SCALE.contains(&i) => "gyro scale",
             i if index::GYRO_MISALIGNMENT.contains(&i) => "gyro misalignment",
             i if index::G_SENSITIVITY.contains(&i) => "sensitivity of the gyro to forces",

@@ -80,6 +80,11 @@ impl RowGroup {
         &mut self.row_mut()[..n]
     }
 
+    /// The first of its global states.
+    pub fn first_global(&self) -> usize {
+        self.globals.start
+    }
+
     /// The entries of its global states in the row.
     pub fn globals_mut(&mut self) -> &mut [f64] {
         let (first, last) = (6 * self.controls.len(), self.width - 1);

@@ -134,7 +134,7 @@ mod tests {
             let n = Vector3::new(0.48, -0.6, 0.64);
             let view = freeze(0.0);
             let mut row = [0.0; N_GLOBALS];
-            add_globals(&mut row, &scene.globals.head, &view.surfels[j], &n, 1.0);
+            add_globals(&mut row, 0, &scene.globals.head, &view.surfels[j], &n, 1.0);
             view.add_pose_response(&mut row, j, &n, 1.0);
             let step = 1e-5;
             let along = |s: f64| n.dot(&freeze(s).surfels[j].mean);

@@ -203,11 +203,13 @@ impl<'a> MatchRows<'a> {
         scale: f64,
     ) -> (NormalEquations, Health) {
         let mut equations = NormalEquations::new(n_controls);
-        let (mut sum, mut health) = (RowGroup::of([], index::HEAD), Health::default());
+        let has_motor = self.head.motor.is_some();
+        let placing = index::placing(has_motor);
+        let (mut sum, mut health) = (RowGroup::of([], placing.clone()), Health::default());
         for rows in rows.chunk_by(|a, b| a.group == b.group) {
             let (first, other) = rows[0].group;
             // The poses of a view follow all of them.
-            let globals = other.map_or(0..N_GLOBALS, |_| index::HEAD);
+            let globals = other.map_or_else(|| index::used(has_motor), |_| placing.clone());
             let controls = (first..first + 4).chain(other.into_iter().flat_map(|f| f..f + 4));
             sum.reset(controls, globals);
             for row in rows {
@@ -230,26 +232,28 @@ impl<'a> MatchRows<'a> {
         let (i, target) = row.pair;
         let surfel = &self.placed.surfels[i as usize];
         let n = &row.plane.normal(surfel);
+        let first = sum.first_global();
         sum.globals_mut().fill(0.0);
         surfel_match::write_knots(&mut sum.knots_mut()[..24], surfel, n, 1.0);
-        surfel_match::add_globals(sum.globals_mut(), self.head, surfel, n, 1.0);
+        surfel_match::add_globals(sum.globals_mut(), first, self.head, surfel, n, 1.0);
         let mut residual = n.dot(&surfel.mean);
         match target {
             Target::Moving(j) => {
                 let other = &self.placed.surfels[j as usize];
                 surfel_match::write_knots(&mut sum.knots_mut()[24..], other, n, -1.0);
-                surfel_match::add_globals(sum.globals_mut(), self.head, other, n, -1.0);
+                surfel_match::add_globals(sum.globals_mut(), first, self.head, other, n, -1.0);
                 residual -= n.dot(&other.mean);
             }
             Target::Fixed(v, j) => {
                 let view = self.views[v as usize];
                 let other = &view.surfels[j as usize];
                 let mut globals = [0.0; N_GLOBALS];
-                surfel_match::add_globals(&mut globals, self.head, other, n, -1.0);
+                surfel_match::add_globals(&mut globals, 0, self.head, other, n, -1.0);
                 view.add_pose_response(&mut globals, j as usize, n, -1.0);
                 residual -= n.dot(&other.mean);
                 let since = &self.since_views[v as usize];
-                for ((to, g), moved) in sum.globals_mut().iter_mut().zip(globals).zip(since) {
+                let entries = globals.into_iter().zip(since).skip(first);
+                for (to, (g, moved)) in sum.globals_mut().iter_mut().zip(entries) {
                     *to += g;
                     residual += g * moved;
                 }

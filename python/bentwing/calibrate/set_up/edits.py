@@ -87,7 +87,14 @@ def with_mount(payload: Payload, mount: FixedMount | MotorMount) -> Payload:
         T_imu_motor=_transform(mount.T_imu_motor),
         T_motor_lidar=_transform(mount.T_motor_lidar),
         zero=mount.encoder_zero,
+        **errors_of(mount),
     )
+
+
+def errors_of(mount: MotorMount) -> dict[str, Any]:
+    """Return how a motor turns otherwise than its encoder reads, as fields of `encoder`."""
+    eccentricity, wobble = mount.errors.eccentricity.tolist(), mount.errors.wobble.tolist()
+    return {"eccentricity": tuple(eccentricity), "wobble": tuple(map(tuple, wobble))}
 
 
 def _transform(pose: Pose) -> Transform:

@@ -21,35 +21,40 @@ if TYPE_CHECKING:
 
     Stated = Mapping[str, Sequence[float]]
 
-N_STATES = 47
+N_STATES = 57
 # Order of the core's `registration::index`.
 SLICES = {
-    "latency": slice(0, 1),
-    "latency_rate": slice(1, 2),
-    "extrinsic_rotation": slice(2, 5),
-    "extrinsic_translation": slice(5, 8),
-    "encoder_zero": slice(8, 9),
-    "motor_tilt": slice(9, 11),
-    "motor_offset": slice(11, 13),
-    "range_offset": slice(13, 14),
-    "range_grazing": slice(14, 15),
-    "gyro_bias": slice(15, 18),
-    "accel_bias": slice(18, 21),
-    "gravity": slice(21, 23),
-    "gyro_scale": slice(23, 26),
-    "gyro_misalignment": slice(26, 29),
-    "g_sensitivity": slice(29, 38),
-    "accel_scale": slice(38, 41),
-    "accel_misalignment": slice(41, 47),
+    "encoder_zero": slice(0, 1),
+    "motor_tilt": slice(1, 3),
+    "motor_offset": slice(3, 5),
+    "encoder_eccentricity": slice(5, 7),
+    "motor_wobble": slice(7, 15),
+    "latency": slice(15, 16),
+    "latency_rate": slice(16, 17),
+    "extrinsic_rotation": slice(17, 20),
+    "extrinsic_translation": slice(20, 23),
+    "range_offset": slice(23, 24),
+    "range_grazing": slice(24, 25),
+    "gyro_bias": slice(25, 28),
+    "accel_bias": slice(28, 31),
+    "gravity": slice(31, 33),
+    "gyro_scale": slice(33, 36),
+    "gyro_misalignment": slice(36, 39),
+    "g_sensitivity": slice(39, 48),
+    "accel_scale": slice(48, 51),
+    "accel_misalignment": slice(51, 57),
 }
 UNIT_STATES = (
     "gyro_scale", "gyro_misalignment", "g_sensitivity", "accel_scale", "accel_misalignment",
 )  # fmt: skip
-MOTOR_STATES = ("encoder_zero", "motor_tilt", "motor_offset")
+MOTOR_STATES = (
+    "encoder_zero", "motor_tilt", "motor_offset", "encoder_eccentricity", "motor_wobble",
+)  # fmt: skip
 RANGE_STATES = ("range_offset", "range_grazing")
 
 # Standard deviations before anything was measured: s, rad, m, rad/s, m/s², rad, rad, rad, m, s/s. Two
 # crystals are up to 20 ppm off each. Where little shows the rate, no more of it should be believed.
+# Discs of encoders are off their axes by up to 0.1°, and shafts wobble by 0.02° to 0.1°.
 # Rangefinders are right to ± 10 to 30 mm, and echoes late by a tenth to a third of a beam of 3 mrad.
 INITIAL_STD = {
     "latency": 3e-3,
@@ -61,6 +66,8 @@ INITIAL_STD = {
     "encoder_zero": 9e-3,
     "motor_tilt": 9e-3,
     "motor_offset": 3e-3,
+    "encoder_eccentricity": 1e-3,
+    "motor_wobble": 5e-4,
     "latency_rate": 2e-5,
     "range_offset": 0.02,
     "range_grazing": 7e-4,
@@ -140,12 +147,12 @@ class SlowStatePrior:
 
     @property
     def information(self) -> NDArray[np.float64]:
-        """(47, 47) information about the prior's mean."""
+        """(57, 57) information about the prior's mean."""
         return self._information
 
     @property
     def offset(self) -> list[float]:
-        """Correction (47,) that leads from the prior's mean to the current values."""
+        """Correction (57,) that leads from the prior's mean to the current values."""
         return self._offset.tolist()
 
     def reset(self, name: str, std: float | NDArray[np.float64]) -> None:
@@ -184,7 +191,7 @@ class SlowStatePrior:
         self._offset[:] = np.linalg.solve(self._information, before @ self._offset)
 
     def discounted(self, covariance: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the covariance (47, 47) after a window as it is if matches depend on each other."""
+        """Return the covariance (57, 57) after a window as it is if matches depend on each other."""
         active = ~self.frozen
         honest = np.zeros_like(covariance)
         if active.any():
@@ -204,8 +211,8 @@ class SlowStatePrior:
 
         Parameters
         ----------
-        covariance : (47, 47) of the slow states after the window, prior included
-        offset : (47,) correction that leads from the prior's mean to the window's estimate
+        covariance : (57, 57) of the slow states after the window, prior included
+        offset : (57,) correction that leads from the prior's mean to the window's estimate
         shift, window : s
         """
         active = ~self.frozen
@@ -243,7 +250,7 @@ def _with_unit(std: Mapping[str, float], errors: Mapping[str, float]) -> dict[st
 
 
 def at_epoch(covariance: NDArray[np.float64], later: float) -> NDArray[np.float64]:
-    """Return the covariance (47, 47) with the latency at an epoch so much later, s."""
+    """Return the covariance (57, 57) with the latency at an epoch so much later, s."""
     change = np.eye(N_STATES)
     change[SLICES["latency"], SLICES["latency_rate"]] = later
     return np.asarray(change @ covariance @ change.T)
@@ -258,7 +265,7 @@ def named_std(covariance: NDArray[np.float64], frozen: NDArray[np.bool_]) -> dic
 
 
 def places_of(names: Iterable[str]) -> NDArray[np.bool_]:
-    """Return which entries (47,) are those of the states with these names."""
+    """Return which entries (57,) are those of the states with these names."""
     chosen = np.zeros(N_STATES, dtype=bool)
     for name in names:
         chosen[SLICES[name]] = True

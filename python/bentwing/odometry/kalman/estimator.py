@@ -257,4 +257,6 @@ class Kalman(Estimator):
         if sweep.angles is None and len(sweep.times):
             msg = "angles: expected the motor's angle of every point, got None"
             raise ValueError(msg)
-        return sweep
+        if sweep.angles is None:
+            return sweep
+        return replace(sweep, angles=sweep.angles + now.mount.errors.added(sweep.angles))

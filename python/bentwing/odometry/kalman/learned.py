@@ -56,7 +56,8 @@ def calibration_of(
     if isinstance(mount, MotorMount):
         # A delay of the encoder is a zero at the rate at which the motor turns.
         zero = mount.encoder_zero - motor_rate * filter_.encoder_delay
-        found = MotorMount(_pose(filter_.base), mount.axis, zero, _pose(filter_.lidar))
+        base, lidar = _pose(filter_.base), _pose(filter_.lidar)
+        found = replace(mount, T_imu_motor=base, encoder_zero=zero, T_motor_lidar=lidar)
         covariance = filter_.covariance
         named["encoder_zero"] = abs(motor_rate) * std[ENCODER_DELAY]
         named["motor_tilt"] = _across(covariance[LIDAR_ROTATION, LIDAR_ROTATION], mount.axis)

@@ -67,6 +67,4 @@ class Scan:
         """Pose of the lidar at the scan's time, given that of the IMU."""
         if isinstance(mount, FixedMount):
             return pose @ mount.T_imu_lidar
-        angle = mount.encoder_zero + (0.0 if self.angles is None else float(self.angles.mean()))
-        turned = Pose(np.zeros(3), geometry.exp(angle * mount.axis))
-        return pose @ mount.T_imu_motor @ turned @ mount.T_motor_lidar
+        return pose @ mount.lidar_at(0.0 if self.angles is None else float(self.angles.mean()))

@@ -12,6 +12,8 @@ STD_UNITS = {
     "motor_offset": "m",
     "encoder_delay": "s",
     "encoder_zero": "rad",
+    "encoder_eccentricity": "rad",
+    "motor_wobble": "rad",
     "latency": "s",
     "extrinsic_rotation": "rad",
     "extrinsic_translation": "m",
@@ -25,7 +27,7 @@ class CalibrationRecord(Section):
 
     `std` are standard deviations by name, in the units of `STD_UNITS`: `motor_tilt` and
     `motor_offset` of the lidar on the motor, about and along the two directions of `motor_across`
-    (motor frame), `encoder_delay`, `encoder_zero`, `latency`, of `T_imu_motor` or `T_imu_lidar`
+    (motor frame), `encoder_delay`, `encoder_zero`, `encoder_eccentricity`, `motor_wobble`, `latency`, of `T_imu_motor` or `T_imu_lidar`
     `extrinsic_rotation` and `extrinsic_translation`, and of `lidar.ranges` `range_offset` and
     `range_grazing`.
     """

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, TypeAlias
 
 import numpy as np
 from pydantic import Field, field_validator
@@ -19,12 +19,15 @@ from bentwing.recording.sections.section import (
 )
 
 AngleUnit = Literal["rad", "deg"]
+Leans: TypeAlias = tuple[Angle, Angle, Angle, Angle]
 
 
 class Encoder(Section):
     """The motor that turns the lidar, whose encoder reads θ.
 
-    `T_imu_lidar(θ) = T_imu_motor · Rot(axis, θ + zero) · T_motor_lidar`
+    `T_imu_lidar(θ) = T_imu_motor · Exp(lean(θ)) · Rot(axis, θ + zero + added(θ)) · T_motor_lidar`, with
+    `added(θ) = eccentricity · (cos θ, sin θ)` and `lean(θ) = wobble · (cos θ, sin θ, cos 2θ, sin 2θ)`
+    about the two directions across the axis.
 
     Attributes
     ----------
@@ -37,6 +40,8 @@ class Encoder(Section):
     zero : rad, added to the encoder's angle
     T_imu_motor : pose of the motor in the IMU frame
     T_motor_lidar : pose of the lidar in the frame that the motor turns
+    eccentricity : rad, of an encoder whose disc is off its axis
+    wobble : rad, of a shaft that leans with its turns; found by `map --write-payload` as the above
     delay : s, at a stamp of the lidar the angle is the encoder's of this much earlier
     """
 
@@ -49,6 +54,8 @@ class Encoder(Section):
     zero: Angle = 0.0
     T_imu_motor: Transform = Transform()
     T_motor_lidar: Transform = Transform()
+    eccentricity: tuple[Angle, Angle] = (0.0, 0.0)
+    wobble: tuple[Leans, Leans] = ((0.0,) * 4, (0.0,) * 4)
     delay: Offset = 0.0
 
     @property

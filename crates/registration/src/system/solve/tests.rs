@@ -63,5 +63,5 @@ fn an_unknown_without_information_is_named() {
     let Err(SolveError::Singular { unknown }) = error else {
         panic!("expected an error")
     };
-    assert_eq!(unknown, "the latency");
+    assert_eq!(unknown, "the encoder zero");
 }

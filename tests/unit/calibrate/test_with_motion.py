@@ -36,7 +36,8 @@ def test_ranges_that_do_not_show_are_left_as_they_were_described():
 def test_how_a_motor_turns_is_written_with_its_deviation_and_read_back(tmp_path):
     payload = Payload.model_validate({"imu": {}, "encoder": {"T_imu_motor": {}}})
     drawn = flown(payload, RangeBias(), motor_wobble=[1e-5] * 8)
-    errors = MotorErrors(np.array([1e-3, -2e-3]), 1e-4 * np.arange(8.0).reshape(2, 4))
+    wobble = np.array([[1e-4, 2e-4, 3e-4, 4e-4], [5e-4, 6e-4, 7e-4, 8e-4]])
+    errors = MotorErrors(np.array([1e-3, -2e-3]), wobble)
     found = replace(drawn, mount=replace(drawn.mount, errors=errors))
     with_motion(payload, found).save(tmp_path / "payload.yaml")
     again = Payload.load(tmp_path / "payload.yaml")

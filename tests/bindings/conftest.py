@@ -148,7 +148,7 @@ def register(flight, drifted, extract):
             "globals": make_globals(),
             "information": INFORMATION,
             "offset": [0.0] * N_STATES,
-            "frozen": [False, True] + [False] * 6 + [True] * 7 + [False] * 32,
+            "frozen": [True] * 15 + [False, True] + [False] * 6 + [True] * 2 + [False] * 32,
             "joined": False,
             "settings": core,
         }

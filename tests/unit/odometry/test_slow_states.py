@@ -124,7 +124,8 @@ def test_a_unit_is_taken_as_ideal_where_the_start_is_in_motion():
 
 def test_places_are_those_of_the_named_states_alone():
     chosen = places_of(["latency", "accel_misalignment"])
-    assert np.flatnonzero(chosen).tolist() == [0, *range(N_STATES - 6, N_STATES)]
+    latency = SLICES["latency"].start
+    assert np.flatnonzero(chosen).tolist() == [latency, *range(N_STATES - 6, N_STATES)]
 
 
 def test_without_an_imu_its_states_are_frozen():
@@ -134,8 +135,9 @@ def test_without_an_imu_its_states_are_frozen():
 
 def test_a_latency_is_less_certain_away_from_where_it_was_seen():
     covariance = np.zeros((N_STATES, N_STATES))
-    covariance[0, 0], rate = 1e-8, np.arange(N_STATES)[SLICES["latency_rate"]]
+    latency, rate = SLICES["latency"].start, SLICES["latency_rate"].start
+    covariance[latency, latency] = 1e-8
     covariance[rate, rate] = 1e-12
     moved = at_epoch(covariance, 100.0)
-    assert moved[0, 0] == pytest.approx(1e-8 + 100.0**2 * 1e-12)
+    assert moved[latency, latency] == pytest.approx(1e-8 + 100.0**2 * 1e-12)
     np.testing.assert_allclose(at_epoch(moved, -100.0), covariance, atol=1e-20)

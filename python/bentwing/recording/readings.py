@@ -15,6 +15,7 @@ import numpy as np
 from bentwing.base.calibration import STANDARD_GRAVITY
 from bentwing.base.clock import to_ns
 from bentwing.recording.beam_reading import BeamReading
+from bentwing.recording.point_times import NOTHING_GIVEN, GivenTimes
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -76,18 +77,26 @@ class LidarReading:
     is_mirrored : y is negated
     beams : what is added to each return by its beam, if anything is
     offset_ns : added to the stamps
+    times : what the payload says of the points' times
     """
 
     range_scale: float = 1.0
     is_mirrored: bool = False
     beams: BeamReading | None = None
     offset_ns: int = 0
+    times: GivenTimes = NOTHING_GIVEN
 
     @classmethod
     def of(cls, lidar: Lidar) -> LidarReading:
         """Return the reading that the payload describes."""
         beams = None if lidar.beams is None else BeamReading(lidar.beams)
-        return cls(lidar.range_scale, lidar.mirrored, beams, -to_ns(lidar.latency_read))
+        return cls(
+            lidar.range_scale,
+            lidar.mirrored,
+            beams,
+            -to_ns(lidar.latency_read),
+            GivenTimes.of(lidar),
+        )
 
     def batch(self, batch: LidarBatch) -> LidarBatch:
         """Return a batch with its points in m, lidar frame."""

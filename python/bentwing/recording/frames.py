@@ -3,39 +3,32 @@
 
 from __future__ import annotations
 
-import difflib
 import itertools
-from collections import deque
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-import numpy as np
 from pydantic import ValidationError
 
-from bentwing.base import geometry, transform
 from bentwing.base.errors import PayloadError
 from bentwing.base.validation import describe
 from bentwing.recording.containers.source import open_source
+from bentwing.recording.link_chain import along, chain, listed
 from bentwing.recording.messages import wire_transforms
 from bentwing.recording.messages.wire import BrokenMessageError
 from bentwing.recording.payload import as_payload
-from bentwing.recording.sections.section import QUATERNION_TOLERANCE, Transform
+from bentwing.recording.sections.section import Transform
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Sequence
     from pathlib import Path
 
-    from numpy.typing import NDArray
-
     from bentwing.recording.containers.interface import Source
-    from bentwing.recording.messages.wire_transforms import Link
+    from bentwing.recording.link_chain import Link
     from bentwing.recording.payload import Payload, PayloadLike
 
 TF_TYPES = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 STATIC = "tf_static"  # how the names of topics end that hold what never changes
 N_MOVING = 500  # messages of /tf, in which every joint that is sent at all comes
-DIGITS = 12  # of m and of a unit quaternion
-MAX_LISTED = 20  # frames in a sentence
 INSTEAD = "give translation and quaternion (or rpy, or matrix) instead of from_tf"
 
 
@@ -61,7 +54,7 @@ class Frames:
         PayloadError
             They are not joined by static transforms; the sentence says what there is.
         """
-        found = _chain(self._static.values(), parent, child)
+        found = chain(self._static.values(), parent, child)
         if found is None:
             raise PayloadError(self._why_not(parent, child))
         return found
@@ -74,18 +67,13 @@ class Frames:
         PayloadError
             They are not joined by static transforms, or one of these is damaged.
         """
-        frames, T = self.chain(parent, child), np.eye(4)
-        for here, there in itertools.pairwise(frames):
-            link = self._static.get(there)
-            if link is not None and link.parent == here:
-                T = T @ _matrix(link)
-            else:
-                T = T @ transform.inverse(_matrix(self._static[here]))
-        parts = {"translation": T[:3, 3], "quaternion": geometry.from_matrices(T[:3, :3])}
-        # The last digits are of the way through other frames; adding zero leaves no minus zero.
-        rounded = {name: (np.round(part, DIGITS) + 0.0).tolist() for name, part in parts.items()}
         try:
-            return Transform.model_validate(rounded)
+            found = along(self._static, self.chain(parent, child))
+        except ValueError as error:
+            msg = f"{error} in /tf_static; {INSTEAD}"
+            raise PayloadError(msg) from None
+        try:
+            return Transform.model_validate(found)
         except ValidationError as error:
             where = f"the pose of {child} in {parent} by /tf_static"
             raise PayloadError(describe(error, Transform, where)) from None
@@ -110,7 +98,7 @@ class Frames:
         # Only now, as /tf can be long.
         moving = self._links({topic.name for topic in self._moved}, N_MOVING)
         every = {**moving, **self._static}
-        joined = _chain(every.values(), parent, child)
+        joined = chain(every.values(), parent, child)
         if joined is not None:
             joints = " and ".join(
                 f"{a} and {b}"
@@ -131,7 +119,7 @@ class Frames:
         known = sorted({frame for link in every.values() for frame in (link.parent, link.child)})
         for frame in (parent, child):
             if frame not in known:
-                return f"the recording has no frame {frame!r}; {_listed(known, frame)}"
+                return f"the recording has no frame {frame!r}; {listed(known, frame, 'its tf')}"
         return (
             f"no chain of static transforms joins {parent} and {child}, which are both in the "
             f"recording's tf: {INSTEAD}"
@@ -193,50 +181,7 @@ def _read(source: Source, given: Transform, key: str) -> Transform:
         raise PayloadError(msg) from None
 
 
-def _chain(links: Iterable[Link], parent: str, child: str) -> list[str] | None:
-    """Return the shortest way between two frames over links in either direction, None without one."""
-    beside: dict[str, list[str]] = {}
-    for link in links:
-        beside.setdefault(link.parent, []).append(link.child)
-        beside.setdefault(link.child, []).append(link.parent)
-    if parent not in beside or child not in beside:
-        return None
-    before, waiting = {child: child}, deque([child])
-    while waiting and parent not in before:
-        here = waiting.popleft()
-        for there in beside[here]:
-            if there not in before:
-                before[there] = here
-                waiting.append(there)
-    if parent not in before:
-        return None
-    way = [parent]
-    while way[-1] != child:
-        way.append(before[way[-1]])
-    return way
-
-
 def _joins(links: dict[str, Link], a: str, b: str) -> bool:
     return any(
         child in links and links[child].parent == parent for parent, child in ((a, b), (b, a))
     )
-
-
-def _matrix(link: Link) -> NDArray[np.float64]:
-    """Return the (4, 4) that takes coordinates in the child to the parent."""
-    t, quat = np.array(link.translation), np.array(link.quaternion)
-    norm = np.linalg.norm(quat)
-    if not (abs(norm - 1.0) <= QUATERNION_TOLERANCE and np.isfinite(t).all()):
-        msg = (
-            f"the transform from {link.parent} to {link.child} in /tf_static is none: its quaternion "
-            f"has norm {norm:.4g}, its translation is {list(link.translation)}; {INSTEAD}"
-        )
-        raise PayloadError(msg)
-    return transform.rigid(geometry.to_matrices(quat / norm), t)
-
-
-def _listed(known: Sequence[str], wanted: str) -> str:
-    near = difflib.get_close_matches(wanted, known, n=1)
-    guess = f"did you mean {near[0]}? " if near else ""
-    more = f" and {len(known) - MAX_LISTED} more" if len(known) > MAX_LISTED else ""
-    return f"{guess}its tf has {', '.join(known[:MAX_LISTED])}{more}"

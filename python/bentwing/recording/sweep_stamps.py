@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 Evidence = Literal["payload", "recorder", "assumed"]
 
 WHOLE = 0.9  # of a sweep's length; a message that arrives sooner was not stamped at its beginning
+CLOCK_STEP = 2e-3  # s, by which the stamps of a sensor may be ahead of the recorder's clock
 MAX_DELAY = 1.0  # s; beyond it the recorder has another clock
 SAME = 1e-6  # s; delays that do not even differ by it were written by a converter
 SINCE: dict[TimeReference, float] = {"start": 0.0, "middle": 0.5, "end": 1.0, "absolute": 0.0}
@@ -99,6 +100,6 @@ class SweepStamps:
         if not self.delays:
             return "end", "recorder"  # whose time is after the last point
         least, most = min(self.delays), max(self.delays)
-        if most - least < SAME or not 0.0 < least < MAX_DELAY:
+        if most - least < SAME or not -CLOCK_STEP < least < MAX_DELAY:
             return "start", "assumed"
         return ("start" if least >= WHOLE * length else "end"), "recorder"

@@ -4,27 +4,11 @@
 from __future__ import annotations
 
 import struct
-from typing import NamedTuple
 
+from bentwing.recording.link_chain import Link
 from bentwing.recording.messages.wire import align, broken_if_malformed, byte_order, frame_name
 
 LEAST_BYTES = 64  # of one transform: two lengths and seven float64
-
-
-class Link(NamedTuple):
-    """The pose of one frame in another: it takes coordinates in `child` to coordinates in `parent`.
-
-    Attributes
-    ----------
-    parent, child : frames, without the slash in front that the first tf had
-    translation : m
-    quaternion : x y z w, as sent
-    """
-
-    parent: str
-    child: str
-    translation: tuple[float, float, float]
-    quaternion: tuple[float, float, float, float]
 
 
 @broken_if_malformed

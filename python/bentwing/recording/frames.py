@@ -7,6 +7,7 @@ import itertools
 from functools import cached_property
 from typing import TYPE_CHECKING
 
+import numpy as np
 from pydantic import ValidationError
 
 from bentwing.base.errors import PayloadError
@@ -17,6 +18,8 @@ from bentwing.recording.messages import wire_transforms
 from bentwing.recording.messages.wire import BrokenMessageError
 from bentwing.recording.payload import as_payload
 from bentwing.recording.sections.section import Transform
+from bentwing.recording.tf_joint import TfJoint
+from bentwing.recording.topics import STATIC, TF_TYPES
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -25,18 +28,24 @@ if TYPE_CHECKING:
     from bentwing.recording.containers.interface import Source
     from bentwing.recording.link_chain import Link
     from bentwing.recording.payload import Payload, PayloadLike
+    from bentwing.recording.sections.encoder import Encoder
 
-TF_TYPES = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
-STATIC = "tf_static"  # how the names of topics end that hold what never changes
+SAME_FRAME = 1e-3  # m and rad
 N_MOVING = 500  # messages of /tf, in which every joint that is sent at all comes
 INSTEAD = "give translation and quaternion (or rpy, or matrix) instead of from_tf"
 
 
 class Frames:
-    """What a recording's /tf_static joins, and what its /tf moves."""
+    """What a recording's /tf_static joins, and what its /tf moves.
 
-    def __init__(self, source: Source) -> None:
-        self._source = source
+    Parameters
+    ----------
+    source : the recording
+    motor : the joint that is the encoder; where it leads, frames are joined as at its angle 0
+    """
+
+    def __init__(self, source: Source, motor: TfJoint | None = None) -> None:
+        self._source, self._motor = source, motor
         topics = [topic for topic in source.topics if topic.type in TF_TYPES and topic.count]
         self._fixed = [topic for topic in topics if topic.name.endswith(STATIC)]
         self._moved = [topic for topic in topics if not topic.name.endswith(STATIC)]
@@ -82,7 +91,11 @@ class Frames:
     def _static(self) -> dict[str, Link]:
         """By child, of which tf knows one parent: the latest that was sent."""
         names = {topic.name for topic in self._fixed}
-        return self._links(names, sum(topic.count for topic in self._fixed))
+        links = self._links(names, sum(topic.count for topic in self._fixed))
+        if self._motor is not None:
+            moved = self._motor.links(self._source, {topic.name for topic in self._moved})
+            links |= {link.child: self._motor.at_zero(link) for _, _, link in moved[:1]}
+        return links
 
     def _links(self, names: set[str], most: int) -> dict[str, Link]:
         links: dict[str, Link] = {}
@@ -107,9 +120,8 @@ class Frames:
             )
             return (
                 f"{child} is not fixed on {parent}: /tf sends the transform between {joints}, which a "
-                "joint moves, and a moving joint of /tf is not read as an encoder yet; record the angle "
-                "as sensor_msgs/JointState and describe the section encoder, or, if nothing moves "
-                f"there, {INSTEAD}"
+                "joint moves; name it in the section encoder as 'from_tf: {parent: ..., child: ...}', or, if "
+                f"nothing moves there, {INSTEAD}"
             )
         if not self.has_static:
             return (
@@ -142,14 +154,31 @@ def placed(payload: Payload, source: Source) -> Payload:
     if encoder is None:
         return payload
     of_motor = {name: getattr(encoder, name) for name in ("T_imu_motor", "T_motor_lidar")}
+    # To the motor the way may lead through the joint; from it to the lidar nothing may move.
+    motors = {"T_imu_motor": TfJoint.of(encoder)}
     update = {
-        name: _read(source, given, f"encoder.{name}")
+        name: _read(source, given, f"encoder.{name}", motors.get(name))
         for name, given in of_motor.items()
         if given.from_tf is not None
     }
+    _require_motor_frame(source, encoder)
     if not update:
         return payload
     return payload.model_copy(update={"encoder": encoder.model_copy(update=update)})
+
+
+def _require_motor_frame(source: Source, encoder: Encoder) -> None:
+    """Refuse a motor that is placed where its joint is fixed, if the joint turns elsewhere."""
+    joint, given = TfJoint.of(encoder), encoder.T_imu_motor.from_tf
+    if joint is None or given is None or given.child.strip("/") != joint.parent:
+        return
+    T = Frames(source, joint).between(joint.parent, joint.child).pose.matrix
+    if np.abs(T - np.eye(4)).max() > SAME_FRAME:
+        msg = (
+            f"encoder.T_imu_motor.from_tf: the joint does not turn about the origin and the axes of "
+            f"{joint.parent}; give 'child: {joint.child}', which is read as at the angle 0"
+        )
+        raise PayloadError(msg)
 
 
 def placed_payload(paths: Sequence[Path], payload: PayloadLike) -> Payload:
@@ -170,12 +199,14 @@ def placed_payload(paths: Sequence[Path], payload: PayloadLike) -> Payload:
         source.close()
 
 
-def _read(source: Source, given: Transform, key: str) -> Transform:
+def _read(source: Source, given: Transform, key: str, motor: TfJoint | None = None) -> Transform:
     reference = given.from_tf
     if reference is None:
         return given
     try:
-        return Frames(source).between(reference.parent.strip("/"), reference.child.strip("/"))
+        return Frames(source, motor).between(
+            reference.parent.strip("/"), reference.child.strip("/")
+        )
     except PayloadError as error:
         msg = f"{key}.from_tf: {error}"
         raise PayloadError(msg) from None

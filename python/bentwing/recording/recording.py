@@ -25,6 +25,7 @@ from bentwing.recording.point_times import TimeReading
 from bentwing.recording.readings import Readings
 from bentwing.recording.slots import group_into_slots, trimmed
 from bentwing.recording.stream_warnings import stream_warnings
+from bentwing.recording.tf_joint import first_link
 from bentwing.recording.tf_mount import TfMount, tf_mount
 from bentwing.recording.topics import NAV_SAT_FIX, PACKET_TYPES, resolve
 
@@ -99,6 +100,14 @@ class Recording:
             self.check()
 
     def _peek(self, role: str, topic: TopicInfo, *, is_alone: bool) -> Peek:
+        if role == "encoder" and (joint := self._readings.encoder.tf) is not None:
+            recorder_ns, stamp_ns = first_link(self._source, topic, joint)
+            return Peek(
+                topic,
+                use_recorder_time=False,
+                first_ns=stamp_ns,
+                offset_ns=stamp_ns - recorder_ns,
+            )
         if role == "encoder":
             joints = peek_joints(self._source, topic, self._readings.encoder.joint)
             return replace(peek(self._source, topic), joints=joints)

@@ -114,7 +114,7 @@ def first_link(source: Source, topic: TopicInfo, joint: TfJoint) -> tuple[int, i
     links = [link for _, _, link in found]
     axis = _own_axis(links)
     if axis is not None and np.linalg.norm(np.cross(axis, joint.axis)) > np.sin(MAX_WOBBLE):
-        x, y, z = axis + 0.0
+        x, y, z = np.round(axis, 3) + 0.0
         msg = (
             f"{where} does not turn about the payload's encoder.axis, but about [{x:.3f}, {y:.3f}, "
             f"{z:.3f}] in the frame of {joint.child}; give that"

@@ -95,8 +95,10 @@ def find_turn(sweeps: Sequence[Sweep], stamps: SweepStamps) -> TurnReading | str
     begins, ends = _ends(usable, turned, way)
     advances = _advance(begins, ends)
     advance = float(np.median(advances))
-    if advance > MAX_ADVANCE:
-        return "a cloud lasts longer than one turn"
+    if not MARGIN < advance <= MAX_ADVANCE:
+        return "a cloud is less than a part of a turn, or much more than one"
+    if float(np.median(np.abs(advances - advance))) > MARGIN:
+        return "the clouds do not follow each other in the turn"
     reference, evidence = stamps.meaning(period)
     turn = period * TURN / advance
     unknown = USUAL_ASIDE * turn / TURN if known is None else 0.0

@@ -158,6 +158,35 @@ def test_one_cloud_alone_gets_no_times():
     assert "too few" in found
 
 
+@pytest.mark.parametrize("order", ["shuffled", "rings", "firing"])
+def test_clouds_that_begin_anywhere_get_no_times(order):
+    rng = np.random.default_rng(3)
+    sweeps = [Lidar(cut=cut, order=order).cloud(0)[0] for cut in rng.uniform(0, 2 * np.pi, 8)]
+    assert isinstance(find_turn(sweeps, stamps_of()), str)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_any_points_get_finite_times_or_a_reason(seed):
+    rng = np.random.default_rng(seed)
+    sweeps = []
+    for _ in range(rng.integers(1, 9)):
+        n = int(rng.integers(0, 600))
+        points = rng.normal(0.0, 1.0, (n, 3)) * 10.0 ** rng.integers(-6, 6)
+        points[: n // 4] = points[:1]
+        rings = rng.integers(0, rng.integers(1, 60_000), n).astype(np.uint16)
+        sweeps.append(Sweep(points, rings if seed % 2 else None))
+    found = find_turn(sweeps, stamps_of(seed=seed))
+    if isinstance(found, str):
+        assert found
+    else:
+        assert all(np.isfinite(found.offsets(*sweep)).all() for sweep in sweeps)
+
+
+def test_an_empty_cloud_has_no_times():
+    reading, _ = off(Lidar())
+    assert len(reading.offsets(np.zeros((0, 3)), np.zeros(0, np.uint16))) == 0
+
+
 @pytest.mark.parametrize(
     ("stamps", "reference", "evidence"),
     [

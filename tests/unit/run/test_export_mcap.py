@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from mcap.reader import make_reader
@@ -13,6 +15,9 @@ from bentwing.base import geometry
 from bentwing.base.covariances import PoseCovariances
 from bentwing.base.errors import UsageError
 from bentwing.map import Crop
+from bentwing.map.chunk import MapChunk
+from bentwing.run.export.finished import Finished
+from bentwing.run.export.mcap_file import write_mcap
 from bentwing.run.run import COVARIANCES
 from support.finished_runs import START_NS, finished_run, flight, on_earth
 
@@ -37,7 +42,7 @@ def run(points, tmp_path_factory):
     return folder
 
 
-def read(path):
+def read(path, *, in_order=True):
     """Return messages by topic with their times in the log, and the names of the types."""
     found, kinds, logged = {}, {}, []
     with path.open("rb") as file:
@@ -47,7 +52,7 @@ def read(path):
             kinds[channel.topic] = schema.name
             found.setdefault(channel.topic, []).append((message.log_time, decoded))
             logged.append(message.log_time)
-    assert logged == sorted(logged)
+    assert not in_order or logged == sorted(logged)
     return found, kinds
 
 
@@ -176,6 +181,31 @@ def test_covariances_that_are_not_known_are_zeros(points, tmp_path):
     turned = link.transform.rotation
     assert geometry.log(np.array([turned.x, turned.y, turned.z, turned.w])).tolist() == [0, 0, 0]
     assert (link.header.frame_id, link.child_frame_id) == ("imu", "lidar")
+
+
+def test_runs_of_a_merged_map_have_frames_and_topics_of_their_own(run, points, tmp_path):
+    alone = Finished.open(run)
+    late_ns = START_NS + 3 * 10**9
+    merged = replace(
+        alone,
+        trajectories={"first day": flight(), "second": flight()},
+        start_ns={"first day": START_NS, "second": late_ns},
+        covariances={"first day": None, "second": None},
+    )
+    times = np.linspace(0.0, 19.9, N)
+    ranges = np.ones(N, np.float32)
+    chunks = [MapChunk(points, times, ranges), MapChunk(points, times + 3.0, ranges)]
+    n = write_mcap(tmp_path / "a.mcap", merged, (chunk for chunk in chunks))
+    found, _ = read(tmp_path / "a.mcap", in_order=False)
+    assert n == 2 * N == sum(message.width for _, message in found["/map_points"])
+    assert set(found) == {
+        "/tf", "/map_points", "/first_day/path", "/first_day/odometry", "/second/path",
+        "/second/odometry",
+    }  # fmt: skip
+    frames = {link.child_frame_id for _, tf in found["/tf"] for link in tf.transforms}
+    assert frames == {"first_day_imu", "second_imu"}
+    assert found["/second/odometry"][0][0] == late_ns
+    assert cloud_points(found["/map_points"][0][1])[0] == ["x", "y", "z"]
 
 
 @pytest.mark.parametrize("wish", [{"epsg": 32632}, {"tiles": 10}])

@@ -44,6 +44,7 @@ N_SECTORS, N_FINE = 72, 20
 MAX_ADVANCE = 1.5 * TURN
 STEADY = np.radians(1.0)
 """Within which the cuts of all clouds may lie to be one."""
+QUARTER = TURN / 4
 LEAST_ASIDE = np.radians(0.5)
 """By which beams look aside if they do; less is what the time within a firing is."""
 USUAL_ASIDE = np.radians(2.0)
@@ -106,7 +107,7 @@ def find_turn(sweeps: Sequence[Sweep], stamps: SweepStamps) -> TurnReading | str
         way.sense,
         turn,
         advance,
-        cut=float(begins[0] + wrapped(begins - begins[0]).min()),
+        cut=_cut(begins, ends, advance),
         reference=reference,
         evidence=evidence,
         is_ordered=way.is_ordered,
@@ -256,6 +257,21 @@ def _advance(begins: Array, ends: Array) -> Array:
     if lasts.max() < starts.min() + STEADY and least > 0.5 * TURN:
         return np.full(len(begins) - 1, TURN)
     return np.asarray(least + (np.diff(begins) - least) % TURN)
+
+
+def _cut(begins: Array, ends: Array, advance: float) -> float:
+    """Return where clouds begin, rad, as far as their points do not tell.
+
+    It is no later than any beginning, and no earlier than a cloud before any end. Where that leaves a
+    part of the turn, from which nothing returned, drivers cut at a quarter of the turn, most of them.
+    """
+    late = float(begins[0] + wrapped(begins - begins[0]).min())
+    early = late + float(wrapped(ends - advance - late).max())
+    if late - early < STEADY:
+        return late
+    middle = 0.5 * (early + late)
+    quarter = np.rint(middle / QUARTER) * QUARTER
+    return float(quarter) if early <= quarter <= late else middle
 
 
 def _error(advances: Array, stamps: SweepStamps, period: float) -> float:

@@ -100,14 +100,13 @@ class TurnReading:
     def __str__(self) -> str:
         way = "counter-clockwise" if self.sense > 0 else "clockwise"
         late = 1e3 * self.unseen / TURN * self.turn
-        all_late = (
-            f", all may be {late:.0f} ms late as nothing returned there" if late > 1.0 else ""
-        )
+        unsure = "; all may be off by up to {:.0f} ms, as nothing returned where clouds begin"
+        shift = unsure.format(late) if late > 1.0 else ""
         return (
             f"time per point made from the azimuth, as the clouds have none: the lidar turns {way} "
             f"seen from above, once in {1e3 * self.turn:.2f} ms; the stamp is taken for that of a "
             f"cloud's {WORDS[self.reference]} ({REASONS[self.evidence]}); likely error "
-            f"{1e3 * self.error:.2g} ms{all_late}"
+            f"{1e3 * self.error:.2g} ms{shift}"
         )
 
     @property

@@ -106,12 +106,18 @@ def test_where_the_order_does_not_tell_how_beams_look_aside_the_error_says_so():
     assert off(Lidar(aside=np.radians(3.0)))[0].error < 0.2 * reading.error
 
 
-def test_where_nothing_returns_at_the_cut_all_are_late_at_most_by_that():
+def test_where_nothing_returns_at_the_cut_all_are_off_at_most_by_that():
     reading, error = off(Lidar(blind=(0.0, 0.5)))
     assert np.ptp(error) < RESOLVED
-    assert 0.9 * reading.unseen < 0.5 + 0.01
-    assert -reading.unseen * PERIOD / (2 * np.pi) - RESOLVED <= error.mean() < RESOLVED
-    assert "all may be" in str(reading)
+    assert reading.unseen == pytest.approx(0.5, abs=0.02)
+    assert abs(error.mean()) < reading.unseen * PERIOD / (2 * np.pi)
+    assert "all may be off by up to 8 ms" in str(reading)
+
+
+@pytest.mark.parametrize("blind", [(0.0, 0.5), (5.8, 6.4)])
+def test_where_nothing_returns_at_the_cut_it_is_at_a_quarter_of_the_turn_if_it_can(blind):
+    _, error = off(Lidar(cut=0.5 * np.pi, blind=blind))
+    assert abs(error).max() < 2 * RESOLVED
 
 
 def test_a_cloud_whose_beginning_does_not_return_keeps_its_times():

@@ -169,3 +169,11 @@ def test_a_merged_map_is_exported_from_its_map_and_from_its_recordings(
     assert bentwing("export", out, "-o", tmp_path / "path.csv").code == 0
     names = sorted(path.name for path in tmp_path.glob("path_*.csv"))
     assert names == sorted(f"path_{folder.name}.csv" for folder in (office, later))
+    said = bentwing("export", out, "-o", tmp_path / "site.mcap", "--spacing", "0.5")
+    assert said.code == 0, said.err
+    topics = {
+        topic["name"]
+        for topic in json.loads(bentwing("info", tmp_path / "site.mcap", "--json").out)["topics"]
+    }
+    assert {"/tf", "/map_points"} < topics
+    assert len(topics) == 6

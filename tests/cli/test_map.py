@@ -234,7 +234,7 @@ def test_messages_with_an_empty_definition(refuse, tmp_path, ros1):
 def test_beams_without_time(refuse, changed_bag):
     def timeless(topic, t, message):
         if topic == "/scan":
-            message.time_increment = 0.0
+            message.time_increment = message.angle_increment = 0.0
         return [(t, message)]
 
     refuse(changed_bag(timeless, until=2.0), "/scan", "no time per beam", "time_increment")

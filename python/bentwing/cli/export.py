@@ -24,6 +24,7 @@ EXAMPLES = (
     "bentwing export run -o near.ply --within 15 --times 30,200",
     "bentwing export run -o tiles.laz --tiles 50 --epsg 25832",
     "bentwing export run -o path.kml",
+    "bentwing export run -o run.mcap",
 )
 
 
@@ -45,7 +46,7 @@ def command(
             "-o",
             metavar="FILE",
             help="Write this; its suffix says the format of a map (.copc.laz .laz .las .ply .pcd .e57) "
-            "or a trajectory (.txt .kitti .csv .kml .geojson).",
+            "or a trajectory (.txt .kitti .csv .kml .geojson); .mcap has both, for Foxglove and RViz.",
         ),
     ],
     map_format: Annotated[

@@ -61,7 +61,8 @@ def _gaps(gaps: list[tuple[float, float]]) -> str:
 
 
 def _sensors(inspection: Inspection) -> Iterator[RenderableType]:
-    if inspection.point_times is not None:
+    made = any((inspection.point_times or "") in warning for warning in inspection.warnings)
+    if inspection.point_times is not None and not made:  # a warning says all of it
         yield f"times      {escape(inspection.point_times)}"
     for number, (role, clock) in enumerate(inspection.clocks.items()):
         yield f"{'' if number else 'clocks':10} {escape(role)} {escape(clock)}"

@@ -3,47 +3,49 @@
 
 from __future__ import annotations
 
-import difflib
 import itertools
-from collections import deque
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 from pydantic import ValidationError
 
-from bentwing.base import geometry, transform
 from bentwing.base.errors import PayloadError
 from bentwing.base.validation import describe
 from bentwing.recording.containers.source import open_source
+from bentwing.recording.link_chain import along, chain, listed
 from bentwing.recording.messages import wire_transforms
 from bentwing.recording.messages.wire import BrokenMessageError
 from bentwing.recording.payload import as_payload
-from bentwing.recording.sections.section import QUATERNION_TOLERANCE, Transform
+from bentwing.recording.sections.section import Transform
+from bentwing.recording.tf_joint import TfJoint
+from bentwing.recording.topics import STATIC, TF_TYPES
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Sequence
     from pathlib import Path
 
-    from numpy.typing import NDArray
-
     from bentwing.recording.containers.interface import Source
-    from bentwing.recording.messages.wire_transforms import Link
+    from bentwing.recording.link_chain import Link
     from bentwing.recording.payload import Payload, PayloadLike
+    from bentwing.recording.sections.encoder import Encoder
 
-TF_TYPES = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
-STATIC = "tf_static"  # how the names of topics end that hold what never changes
+SAME_FRAME = 1e-3  # m and rad
 N_MOVING = 500  # messages of /tf, in which every joint that is sent at all comes
-DIGITS = 12  # of m and of a unit quaternion
-MAX_LISTED = 20  # frames in a sentence
 INSTEAD = "give translation and quaternion (or rpy, or matrix) instead of from_tf"
 
 
 class Frames:
-    """What a recording's /tf_static joins, and what its /tf moves."""
+    """What a recording's /tf_static joins, and what its /tf moves.
 
-    def __init__(self, source: Source) -> None:
-        self._source = source
+    Parameters
+    ----------
+    source : the recording
+    motor : the joint that is the encoder; where it leads, frames are joined as at its angle 0
+    """
+
+    def __init__(self, source: Source, motor: TfJoint | None = None) -> None:
+        self._source, self._motor = source, motor
         topics = [topic for topic in source.topics if topic.type in TF_TYPES and topic.count]
         self._fixed = [topic for topic in topics if topic.name.endswith(STATIC)]
         self._moved = [topic for topic in topics if not topic.name.endswith(STATIC)]
@@ -61,7 +63,7 @@ class Frames:
         PayloadError
             They are not joined by static transforms; the sentence says what there is.
         """
-        found = _chain(self._static.values(), parent, child)
+        found = chain(self._static.values(), parent, child)
         if found is None:
             raise PayloadError(self._why_not(parent, child))
         return found
@@ -74,18 +76,13 @@ class Frames:
         PayloadError
             They are not joined by static transforms, or one of these is damaged.
         """
-        frames, T = self.chain(parent, child), np.eye(4)
-        for here, there in itertools.pairwise(frames):
-            link = self._static.get(there)
-            if link is not None and link.parent == here:
-                T = T @ _matrix(link)
-            else:
-                T = T @ transform.inverse(_matrix(self._static[here]))
-        parts = {"translation": T[:3, 3], "quaternion": geometry.from_matrices(T[:3, :3])}
-        # The last digits are of the way through other frames; adding zero leaves no minus zero.
-        rounded = {name: (np.round(part, DIGITS) + 0.0).tolist() for name, part in parts.items()}
         try:
-            return Transform.model_validate(rounded)
+            found = along(self._static, self.chain(parent, child))
+        except ValueError as error:
+            msg = f"{error} in /tf_static; {INSTEAD}"
+            raise PayloadError(msg) from None
+        try:
+            return Transform.model_validate(found)
         except ValidationError as error:
             where = f"the pose of {child} in {parent} by /tf_static"
             raise PayloadError(describe(error, Transform, where)) from None
@@ -94,7 +91,11 @@ class Frames:
     def _static(self) -> dict[str, Link]:
         """By child, of which tf knows one parent: the latest that was sent."""
         names = {topic.name for topic in self._fixed}
-        return self._links(names, sum(topic.count for topic in self._fixed))
+        links = self._links(names, sum(topic.count for topic in self._fixed))
+        if self._motor is not None:
+            moved = self._motor.links(self._source, {topic.name for topic in self._moved})
+            links |= {link.child: self._motor.at_zero(link) for _, _, link in moved[:1]}
+        return links
 
     def _links(self, names: set[str], most: int) -> dict[str, Link]:
         links: dict[str, Link] = {}
@@ -110,7 +111,7 @@ class Frames:
         # Only now, as /tf can be long.
         moving = self._links({topic.name for topic in self._moved}, N_MOVING)
         every = {**moving, **self._static}
-        joined = _chain(every.values(), parent, child)
+        joined = chain(every.values(), parent, child)
         if joined is not None:
             joints = " and ".join(
                 f"{a} and {b}"
@@ -119,9 +120,8 @@ class Frames:
             )
             return (
                 f"{child} is not fixed on {parent}: /tf sends the transform between {joints}, which a "
-                "joint moves, and a moving joint of /tf is not read as an encoder yet; record the angle "
-                "as sensor_msgs/JointState and describe the section encoder, or, if nothing moves "
-                f"there, {INSTEAD}"
+                "joint moves; name it in the section encoder as 'from_tf: {parent: ..., child: ...}', or, if "
+                f"nothing moves there, {INSTEAD}"
             )
         if not self.has_static:
             return (
@@ -131,7 +131,7 @@ class Frames:
         known = sorted({frame for link in every.values() for frame in (link.parent, link.child)})
         for frame in (parent, child):
             if frame not in known:
-                return f"the recording has no frame {frame!r}; {_listed(known, frame)}"
+                return f"the recording has no frame {frame!r}; {listed(known, frame, 'its tf')}"
         return (
             f"no chain of static transforms joins {parent} and {child}, which are both in the "
             f"recording's tf: {INSTEAD}"
@@ -154,14 +154,31 @@ def placed(payload: Payload, source: Source) -> Payload:
     if encoder is None:
         return payload
     of_motor = {name: getattr(encoder, name) for name in ("T_imu_motor", "T_motor_lidar")}
+    # To the motor the way may lead through the joint; from it to the lidar nothing may move.
+    motors = {"T_imu_motor": TfJoint.of(encoder)}
     update = {
-        name: _read(source, given, f"encoder.{name}")
+        name: _read(source, given, f"encoder.{name}", motors.get(name))
         for name, given in of_motor.items()
         if given.from_tf is not None
     }
+    _require_motor_frame(source, encoder)
     if not update:
         return payload
     return payload.model_copy(update={"encoder": encoder.model_copy(update=update)})
+
+
+def _require_motor_frame(source: Source, encoder: Encoder) -> None:
+    """Refuse a motor that is placed where its joint is fixed, if the joint turns elsewhere."""
+    joint, given = TfJoint.of(encoder), encoder.T_imu_motor.from_tf
+    if joint is None or given is None or given.child.strip("/") != joint.parent:
+        return
+    T = Frames(source, joint).between(joint.parent, joint.child).pose.matrix
+    if np.abs(T - np.eye(4)).max() > SAME_FRAME:
+        msg = (
+            f"encoder.T_imu_motor.from_tf: the joint does not turn about the origin and the axes of "
+            f"{joint.parent}; give 'child: {joint.child}', which is read as at the angle 0"
+        )
+        raise PayloadError(msg)
 
 
 def placed_payload(paths: Sequence[Path], payload: PayloadLike) -> Payload:
@@ -182,61 +199,20 @@ def placed_payload(paths: Sequence[Path], payload: PayloadLike) -> Payload:
         source.close()
 
 
-def _read(source: Source, given: Transform, key: str) -> Transform:
+def _read(source: Source, given: Transform, key: str, motor: TfJoint | None = None) -> Transform:
     reference = given.from_tf
     if reference is None:
         return given
     try:
-        return Frames(source).between(reference.parent.strip("/"), reference.child.strip("/"))
+        return Frames(source, motor).between(
+            reference.parent.strip("/"), reference.child.strip("/")
+        )
     except PayloadError as error:
         msg = f"{key}.from_tf: {error}"
         raise PayloadError(msg) from None
-
-
-def _chain(links: Iterable[Link], parent: str, child: str) -> list[str] | None:
-    """Return the shortest way between two frames over links in either direction, None without one."""
-    beside: dict[str, list[str]] = {}
-    for link in links:
-        beside.setdefault(link.parent, []).append(link.child)
-        beside.setdefault(link.child, []).append(link.parent)
-    if parent not in beside or child not in beside:
-        return None
-    before, waiting = {child: child}, deque([child])
-    while waiting and parent not in before:
-        here = waiting.popleft()
-        for there in beside[here]:
-            if there not in before:
-                before[there] = here
-                waiting.append(there)
-    if parent not in before:
-        return None
-    way = [parent]
-    while way[-1] != child:
-        way.append(before[way[-1]])
-    return way
 
 
 def _joins(links: dict[str, Link], a: str, b: str) -> bool:
     return any(
         child in links and links[child].parent == parent for parent, child in ((a, b), (b, a))
     )
-
-
-def _matrix(link: Link) -> NDArray[np.float64]:
-    """Return the (4, 4) that takes coordinates in the child to the parent."""
-    t, quat = np.array(link.translation), np.array(link.quaternion)
-    norm = np.linalg.norm(quat)
-    if not (abs(norm - 1.0) <= QUATERNION_TOLERANCE and np.isfinite(t).all()):
-        msg = (
-            f"the transform from {link.parent} to {link.child} in /tf_static is none: its quaternion "
-            f"has norm {norm:.4g}, its translation is {list(link.translation)}; {INSTEAD}"
-        )
-        raise PayloadError(msg)
-    return transform.rigid(geometry.to_matrices(quat / norm), t)
-
-
-def _listed(known: Sequence[str], wanted: str) -> str:
-    near = difflib.get_close_matches(wanted, known, n=1)
-    guess = f"did you mean {near[0]}? " if near else ""
-    more = f" and {len(known) - MAX_LISTED} more" if len(known) > MAX_LISTED else ""
-    return f"{guess}its tf has {', '.join(known[:MAX_LISTED])}{more}"

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from bentwing.base.clock import Clock
     from bentwing.recording.batches import LidarBatch
-    from bentwing.recording.point_times import TimeReading
+    from bentwing.recording.point_times import Reading
     from bentwing.recording.readings import LidarReading
     from bentwing.recording.streams import RawMessage
 
@@ -48,7 +48,7 @@ class LidarStream:
         *,
         cdr: bool,
         use_recorder_time: bool,
-        times: TimeReading | None,
+        times: Reading | None,
         needs_beam_times: bool,
     ) -> None:
         self.counts: Counter[str] = Counter()
@@ -97,7 +97,9 @@ class LidarStream:
                 self.counts["broken_messages"] += 1
                 continue
             if self._needs_beam_times and not self._decoder.has_point_times(message):
-                raise RecordingError(problems.point_times(self._topic, self._kind))
+                raise RecordingError(
+                    problems.point_times(self._topic, self._kind, "others have it")
+                )
             stamp_ns = self.monitor.accept(message.stamp_ns, recorder_ns)
             if stamp_ns is not None:
                 accepted.append(message)

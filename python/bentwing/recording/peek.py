@@ -5,24 +5,29 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bentwing.base.errors import RecordingError
 from bentwing.recording.messages import wire
 from bentwing.recording.messages.lidar_messages import LIDAR_MESSAGES
+from bentwing.recording.point_times import NOTHING_GIVEN
+from bentwing.recording.sweep_stamps import SweepStamps
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from bentwing.recording.containers.interface import Source
     from bentwing.recording.containers.scanned import TopicInfo
+    from bentwing.recording.messages.decoder import LidarDecoder
     from bentwing.recording.packets.clock import ClockReading
     from bentwing.recording.packets.sensors import ImuPackets, LidarPackets
-    from bentwing.recording.point_times import TimeReading
+    from bentwing.recording.point_times import GivenTimes, Reading
 
 N_PEEKED = 5  # messages; a cloud can be large and its chunk slow to decompress
+N_SWEEPS = 8  # that show how a lidar turns
+ENOUGH_STAMPS, MOST_STAMPS, LONG_NS = 70, 400, 3_000_000_000  # that have a period
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +42,8 @@ class Peek:
     offset_ns : header's minus recorder's time of the first message
     point_times : sentence on how the time of each point is known, None where it is not
     reading : of the points' times, where the type of message needs one
+    are_times_made : by where the lidar looked, as the messages have none
+    lack : why points have no times and get none
     packet_clock : what the stamps of raw packets mean
     joints : names in the messages of an encoder
     lidar_packets, imu_packets : makers of the decoder for raw packets, the one of the role
@@ -47,7 +54,9 @@ class Peek:
     first_ns: int
     offset_ns: int
     point_times: str | None = None
-    reading: TimeReading | None = None
+    reading: Reading | None = None
+    are_times_made: bool = False
+    lack: str = ""
     packet_clock: ClockReading | None = None
     joints: tuple[str, ...] = ()
     lidar_packets: Callable[[], LidarPackets] | None = None
@@ -60,13 +69,17 @@ class Peek:
         )
 
 
-def peek(source: Source, topic: TopicInfo) -> Peek:
+def peek(source: Source, topic: TopicInfo, given: GivenTimes = NOTHING_GIVEN) -> Peek:
     """Look at the first messages of a topic.
+
+    Parameters
+    ----------
+    given : what the payload says of the points' times
 
     Raises
     ------
-    RecordingError
-        None of them can be read.
+    RecordingError, PayloadError
+        None of them can be read, or they are not what the payload says.
     """
     headers = []
     messages = []
@@ -82,14 +95,48 @@ def peek(source: Source, topic: TopicInfo) -> Peek:
     use_recorder_time = all(header_ns == 0 for header_ns, _ in headers)
     stamps_ns = [recorder if use_recorder_time else header for header, recorder in headers]
     sentence: str | None = None
-    reading: TimeReading | None = None
+    reading: Reading | None = None
+    made: Reading | str | None = None
     if topic.type in LIDAR_MESSAGES:
         decoder = LIDAR_MESSAGES[topic.type](cdr=source.cdr)
-        sentence, reading = decoder.point_times(messages, stamps_ns)
+        sentence, reading = decoder.point_times(messages, stamps_ns, given)
+        if sentence is None:
+            made = _made_times(source, topic, decoder, given)
+            sentence, reading = (None, None) if isinstance(made, str) else (str(made), made)
     early = min(0.0, reading.first if reading else 0.0)
     offset_ns = 0 if use_recorder_time else headers[0][0] - headers[0][1]
-    first_ns = min(stamps_ns) + int(np.floor(early * 1e9))
-    return Peek(topic, use_recorder_time, first_ns, offset_ns, sentence, reading)
+    return Peek(
+        topic,
+        use_recorder_time,
+        first_ns=min(stamps_ns) + int(np.floor(early * 1e9)),
+        offset_ns=offset_ns,
+        point_times=sentence,
+        reading=reading,
+        are_times_made=made is not None and reading is not None,
+        lack=made if isinstance(made, str) else "",
+    )
+
+
+def _made_times(
+    source: Source, topic: TopicInfo, decoder: LidarDecoder[Any], given: GivenTimes
+) -> Reading | str:
+    """Return how points get times by where the lidar looked, or why they cannot."""
+    messages: list[bytes] = []
+    headers_ns: list[int] = []
+    recorder_ns: list[int] = []
+    for _, arrival_ns, raw in itertools.islice(source.messages({topic.name}), MOST_STAMPS):
+        try:
+            headers_ns.append(wire.stamp_ns(raw, cdr=source.cdr))
+        except wire.BrokenMessageError:
+            continue
+        recorder_ns.append(arrival_ns)
+        if len(messages) < N_SWEEPS:
+            messages.append(raw)
+        is_long = recorder_ns[-1] - recorder_ns[0] >= LONG_NS
+        if len(recorder_ns) >= ENOUGH_STAMPS and is_long:
+            break
+    stamps = SweepStamps.of(headers_ns, recorder_ns, given.reference)
+    return decoder.made_times(messages, stamps)
 
 
 def unreadable(topic: TopicInfo) -> RecordingError:

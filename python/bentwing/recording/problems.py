@@ -25,18 +25,24 @@ def mount(imu_topic: str, *, turned: bool) -> str:
     )
 
 
-def point_times(lidar_topic: str, lidar_type: str) -> str:
-    """Return the sentence on a lidar that does not tell when each point was measured."""
+def point_times(lidar_topic: str, lidar_type: str, lack: str) -> str:
+    """Return the sentence on a lidar that does not tell when each point was measured.
+
+    Parameters
+    ----------
+    lack : why the times cannot be made either
+    """
     if is_planar(lidar_type):
         return (
-            f"{lidar_topic}: no time per beam (time_increment is 0), so a moving scan cannot be "
-            "undistorted; set time_increment (time per turn / beams per turn) in the lidar's "
-            "driver and record again"
+            f"{lidar_topic}: no time per beam (time_increment is 0), and none can be made of the angles "
+            f"({lack}), so a moving scan cannot be undistorted; set time_increment (time per turn / "
+            "beams per turn) in the lidar's driver and record again"
         )
     return (
         f"{lidar_topic}: no time per point (no field t, time or timestamp that varies within a "
-        "cloud), so a moving sweep cannot be undistorted; switch it on in the lidar's driver and "
-        "record again"
+        f"cloud), and none can be made of the azimuths ({lack}), so a moving sweep cannot be "
+        "undistorted; if another field has the times, name it in the payload with 'lidar: {time_field: "
+        "...}', else switch them on in the lidar's driver and record again"
     )
 
 

@@ -15,6 +15,9 @@ import numpy as np
 from bentwing.base.calibration import STANDARD_GRAVITY
 from bentwing.base.clock import to_ns
 from bentwing.recording.beam_reading import BeamReading
+from bentwing.recording.messages import wire
+from bentwing.recording.point_times import NOTHING_GIVEN, GivenTimes
+from bentwing.recording.tf_joint import TfJoint
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -76,18 +79,26 @@ class LidarReading:
     is_mirrored : y is negated
     beams : what is added to each return by its beam, if anything is
     offset_ns : added to the stamps
+    times : what the payload says of the points' times
     """
 
     range_scale: float = 1.0
     is_mirrored: bool = False
     beams: BeamReading | None = None
     offset_ns: int = 0
+    times: GivenTimes = NOTHING_GIVEN
 
     @classmethod
     def of(cls, lidar: Lidar) -> LidarReading:
         """Return the reading that the payload describes."""
         beams = None if lidar.beams is None else BeamReading(lidar.beams)
-        return cls(lidar.range_scale, lidar.mirrored, beams, -to_ns(lidar.latency_read))
+        return cls(
+            lidar.range_scale,
+            lidar.mirrored,
+            beams,
+            -to_ns(lidar.latency_read),
+            GivenTimes.of(lidar),
+        )
 
     def batch(self, batch: LidarBatch) -> LidarBatch:
         """Return a batch with its points in m, lidar frame."""
@@ -137,11 +148,13 @@ class EncoderReading:
     Attributes
     ----------
     joint : which one of a message; None: the first
+    tf : the joint of /tf that is read instead, if it is
     scale : rad per unit of the recording, with the sign
     offset_ns : added to the stamps
     """
 
     joint: str | None = None
+    tf: TfJoint | None = None
     scale: float = 1.0
     offset_ns: int = 0
 
@@ -152,7 +165,20 @@ class EncoderReading:
             return cls()
         unit = DEGREE if encoder.unit == "deg" else 1.0
         offset_ns = to_ns(encoder.clock_offset) - to_ns(lidar.latency_read)
-        return cls(encoder.joint, encoder.sign * unit, offset_ns)
+        return cls(encoder.joint, TfJoint.of(encoder), encoder.sign * unit, offset_ns)
+
+    def read(self, raw: bytes, *, cdr: bool) -> tuple[int, float | None]:
+        """Return stamp, ns, and position of the joint in a message, None where it does not have it.
+
+        Raises
+        ------
+        BrokenMessageError
+            It cannot be read.
+        """
+        if self.tf is not None:
+            return self.tf.read(raw, cdr=cdr)
+        header_ns, joints = wire.joints(raw, cdr=cdr)
+        return header_ns, joints.position(self.joint)
 
     def angles(self, positions: Array) -> Array:
         """Return angles (K,), rad, about the payload's axis."""

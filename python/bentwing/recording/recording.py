@@ -21,9 +21,11 @@ from bentwing.recording.open_streams import open_streams
 from bentwing.recording.packets.peek import peek_imu, peek_lidar
 from bentwing.recording.payload import as_payload
 from bentwing.recording.peek import Peek, peek
+from bentwing.recording.point_times import TimeReading
 from bentwing.recording.readings import Readings
 from bentwing.recording.slots import group_into_slots, trimmed
 from bentwing.recording.stream_warnings import stream_warnings
+from bentwing.recording.tf_joint import first_link
 from bentwing.recording.tf_mount import TfMount, tf_mount
 from bentwing.recording.topics import NAV_SAT_FIX, PACKET_TYPES, resolve
 
@@ -98,12 +100,26 @@ class Recording:
             self.check()
 
     def _peek(self, role: str, topic: TopicInfo, *, is_alone: bool) -> Peek:
+        if role == "encoder" and (joint := self._readings.encoder.tf) is not None:
+            recorder_ns, stamp_ns = first_link(self._source, topic, joint)
+            return Peek(
+                topic,
+                use_recorder_time=False,
+                first_ns=stamp_ns,
+                offset_ns=stamp_ns - recorder_ns,
+            )
         if role == "encoder":
             joints = peek_joints(self._source, topic, self._readings.encoder.joint)
             return replace(peek(self._source, topic), joints=joints)
         if topic.type not in PACKET_TYPES:
-            return peek(self._source, topic)
+            return peek(self._source, topic, self._readings.lidar.times)
         if role == "lidar":
+            self._readings.lidar.times.refuse(
+                "are raw packets, which have the time of every firing",
+                "time_field",
+                "time_unit",
+                "time_reference",
+            )
             return peek_lidar(self._source, topic, self.payload.lidar, is_alone=is_alone)
         clock = self._peeks["lidar"].packet_clock
         return peek_imu(self._source, topic, self.payload.lidar, clock)
@@ -120,7 +136,7 @@ class Recording:
             turned = self.payload.encoder is not None
             raise PayloadError(problems.mount(self.imu_topic or "", turned=turned))
         if self.point_times is None:
-            raise RecordingError(problems.point_times(self.lidar_topic, self.lidar_type))
+            raise RecordingError(self.point_times_problem)
         for problem in self.clock_problems():
             raise RecordingError(problem)
         if "imu" in self._peeks:
@@ -230,6 +246,11 @@ class Recording:
         return self._peeks["lidar"].point_times
 
     @property
+    def point_times_problem(self) -> str:
+        """The sentence on a lidar whose points have no times."""
+        return problems.point_times(self.lidar_topic, self.lidar_type, self._peeks["lidar"].lack)
+
+    @property
     def start_ns(self) -> int:
         """Stamp of the earliest sample, ns UTC as in the source."""
         return self.clock.start_ns
@@ -285,8 +306,10 @@ class Recording:
     def warnings(self) -> list[str]:
         """What was found odd so far, as sentences; complete after a pass over `batches`."""
         sentences = [*self._source.warnings, *self._opening_warnings]
-        reading = self._peeks["lidar"].reading
-        if reading is not None and reading.origin == "sensor":
+        lidar = self._peeks["lidar"]
+        if lidar.are_times_made:
+            sentences.append(f"{self.lidar_topic}: {lidar.point_times}")
+        if isinstance(lidar.reading, TimeReading) and lidar.reading.origin == "sensor":
             sentences.append(
                 f"{self.lidar_topic}: the points' times are on another clock than the header "
                 "stamps, so each sweep's first point is put at its stamp; let the driver use one "

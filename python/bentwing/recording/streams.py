@@ -115,7 +115,7 @@ def usable_samples(
 
 
 class EncoderStream:
-    """sensor_msgs/JointState, the position of one joint, unwrapped over the whole pass."""
+    """The position of one joint of JointState or /tf, unwrapped over the whole pass."""
 
     def __init__(
         self,
@@ -139,10 +139,10 @@ class EncoderStream:
     def foresee(self, recorder_ns: int, raw: bytes) -> int | None:
         """Take a message that `decode` will get later."""
         try:
-            header_ns, joints = wire.joints(raw, cdr=self._cdr)
+            header_ns, angle = self._reading.read(raw, cdr=self._cdr)
         except wire.BrokenMessageError:
             return 0
-        if joints.position(self._reading.joint) is None:
+        if angle is None:
             return 0
         return self.monitor.foresee(header_ns, recorder_ns, raw)
 
@@ -151,11 +151,10 @@ class EncoderStream:
         stamps_ns, angles = [], []
         for recorder_ns, raw in messages:
             try:
-                header_ns, joints = wire.joints(raw, cdr=self._cdr)
+                header_ns, angle = self._reading.read(raw, cdr=self._cdr)
             except wire.BrokenMessageError:
                 self.counts["broken_messages"] += 1
                 continue
-            angle = joints.position(self._reading.joint)
             if angle is None:  # several drivers may share a topic, each with joints of its own
                 self.counts["other_joints"] += 1
                 continue

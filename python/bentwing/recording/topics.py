@@ -38,6 +38,8 @@ IMU_TYPES = ((IMU,), (*OUSTER_PACKETS, UDP_OUSTER_IMU))
 NAV_SAT_FIX = "sensor_msgs/msg/NavSatFix"
 JOINT_STATE = "sensor_msgs/msg/JointState"
 ENCODER_TYPES = ((JOINT_STATE,),)
+TF_TYPES = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
+STATIC = "tf_static"  # how the names of topics end that hold what never changes
 
 
 class Roles(NamedTuple):
@@ -65,11 +67,14 @@ def resolve(topics: Sequence[TopicInfo], payload: Payload) -> Roles:
         raise RecordingError(msg)
     encoder = None
     if payload.encoder is not None:
-        encoder = _one(topics, "encoder", ENCODER_TYPES, payload.encoder.topic)
+        is_tf = payload.encoder.from_tf is not None
+        types = (TF_TYPES,) if is_tf else ENCODER_TYPES
+        possible = [topic for topic in topics if not (is_tf and topic.name.endswith(STATIC))]
+        encoder = _one(possible, "encoder", types, payload.encoder.topic)
         if encoder is None:
             msg = (
                 "the payload describes an encoder, but the recording has no topic of type "
-                f"{JOINT_STATE} (it has {_listed(topics)}); record the encoder, or remove "
+                f"{types[0][0]} (it has {_listed(topics)}); record the encoder, or remove "
                 "'encoder' from the payload if the lidar does not turn"
             )
             raise RecordingError(msg)

@@ -46,4 +46,5 @@ FaultName: TypeAlias = Literal[
     "ranges-constant", "points-shuffled", "lidar-level",
     "encoder-degrees", "encoder-negated", "encoder-turned", "encoder-late", "encoder-axis",
     "encoder-second",
+    "times-none", "times-none-end",
 ]  # fmt: skip

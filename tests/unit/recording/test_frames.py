@@ -115,7 +115,7 @@ def test_a_moving_joint_on_the_way_is_named(recorded):
     path = recorded("joint", (BASE_IMU, BASE_PLATE), [turning])
     said = refusal(path, "imu_link", "lidar_link")
     assert "between plate and lidar_link" in said
-    assert "not read as an encoder yet" in said
+    assert "name it in the section encoder as 'from_tf" in said
 
 
 def test_frames_that_nothing_joins_are_said_to_be_apart(recorded):

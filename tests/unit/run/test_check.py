@@ -47,7 +47,7 @@ def head(request, tmp_path, ros1, head_entries):
             if wrong == "level":
                 message.linear_acceleration.x, message.linear_acceleration.z = 0.0, 9.81
         elif wrong == "no beam times":
-            message.time_increment = 0.0
+            message.time_increment = message.angle_increment = 0.0
         elif wrong == "no return":
             message.ranges = np.full(100, np.inf, np.float32)
         entries.append((topic, t, message))

@@ -340,6 +340,28 @@ def test_shuffled_points_are_the_same_points_at_other_times(faulty):
     assert (new["x"] == old["x"]).mean() < 0.05
 
 
+@pytest.mark.parametrize("name", ["times-none", "times-none-end"])
+def test_clouds_without_times_are_those_points_and_may_be_stamped_at_their_end(name, faulty):
+    before, after, *_ = faulty(name, "vlp16-fixed")
+    old, new = (messages.table(one.parsed["lidar"][3]) for one in (before, after))
+    assert new.dtype.names == ("x", "y", "z", "intensity", "ring")
+    for field in new.dtype.names:
+        np.testing.assert_array_equal(new[field], old[field])
+    late = 1e-9 * (after.stamps("lidar")[3] - before.stamps("lidar")[3])
+    assert late == pytest.approx(old["time"].max() if name.endswith("end") else 0.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("name", ["times-none", "times-none-end"])
+def test_scans_without_times_say_neither_increment_nor_length(name, faulty):
+    before, after, *_ = faulty(name, "hokuyo-spin")
+    old, new = (one.parsed["lidar"][3] for one in (before, after))
+    assert (new.time_increment, new.scan_time) == (0.0, 0.0)
+    np.testing.assert_array_equal(new.ranges, old.ranges)
+    late = 1e-9 * (after.stamps("lidar")[3] - before.stamps("lidar")[3])
+    length = old.time_increment * (len(old.ranges) - 1)
+    assert late == pytest.approx(length if name.endswith("end") else 0.0, abs=1e-6)
+
+
 def test_a_level_lidar_sees_one_ring_at_the_times_of_its_points(faulty):
     before, after, _, payload = faulty("lidar-level")
     assert payload["lidar"]["kind"] == "generic"

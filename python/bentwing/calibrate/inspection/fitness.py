@@ -109,11 +109,7 @@ def _start_warnings(static: Stretch | None) -> list[str]:
 
 
 def _time_defects(recording: Recording) -> list[str]:
-    return (
-        []
-        if recording.point_times
-        else [problems.point_times(recording.lidar_topic, recording.lidar_type)]
-    )
+    return [] if recording.point_times else [recording.point_times_problem]
 
 
 def _rate_hz(times: NDArray[np.float64]) -> float:

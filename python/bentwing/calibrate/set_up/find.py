@@ -183,9 +183,12 @@ def _joints(paths: Sequence[Path], payload: Payload, stretch: Stretch) -> dict[J
         names = recording.joints
     found: dict[Joint, EncoderBatch] = {}
     # The only joint of a topic need not be named.
-    only = None if payload.encoder is None else payload.encoder.joint
+    encoder = payload.encoder
+    only = None if encoder is None else encoder.joint
+    # A joint of /tf is in radians, always.
+    units = UNITS if encoder is None or encoder.from_tf is None else UNITS[:1]
     for name in names if len(names) > 1 else (only,):
-        for unit in UNITS:
+        for unit in units:
             read = edits.with_encoder(payload, joint=name, unit=unit, sign=1)
             with Recording(paths, read, strict=False) as recording:
                 batches = [b for b in recording.encoder_batches() if isinstance(b, EncoderBatch)]

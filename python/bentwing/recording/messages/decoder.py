@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bentwing.recording.batches import LidarBatch
-    from bentwing.recording.point_times import TimeReading
+    from bentwing.recording.point_times import GivenTimes, Reading
+    from bentwing.recording.sweep_stamps import SweepStamps
 
 
 class Stamped(Protocol):
@@ -44,7 +45,7 @@ class LidarDecoder(ABC, Generic[Message]):
     is_planar: ClassVar[bool] = False
 
     def __init__(
-        self, *, cdr: bool, reading: TimeReading | None = None, range_scale: float = 1.0
+        self, *, cdr: bool, reading: Reading | None = None, range_scale: float = 1.0
     ) -> None:
         self.cdr = cdr
         self.reading = reading
@@ -52,18 +53,38 @@ class LidarDecoder(ABC, Generic[Message]):
 
     @abstractmethod
     def point_times(
-        self, messages: Sequence[bytes], stamps_ns: Sequence[int]
-    ) -> tuple[str | None, TimeReading | None]:
+        self, messages: Sequence[bytes], stamps_ns: Sequence[int], given: GivenTimes
+    ) -> tuple[str | None, Reading | None]:
         """Return how the time of each point is known.
 
         Parameters
         ----------
         messages, stamps_ns : the first ones of the topic
+        given : what the payload says of them
 
         Returns
         -------
-        A sentence, None where the times are not known, and the reading of a time field if there is one.
+        A sentence, None where the messages do not tell, and the reading of a time field if there is one.
+
+        Raises
+        ------
+        PayloadError
+            What the payload says does not hold for the messages.
         """
+
+    def made_times(
+        self,
+        messages: Sequence[bytes],  # noqa: ARG002 - most types have times
+        stamps: SweepStamps,  # noqa: ARG002
+    ) -> Reading | str:
+        """Return how points get times where the messages have none, or why they cannot.
+
+        Parameters
+        ----------
+        messages : the first ones of the topic
+        stamps : of these and more
+        """
+        return "its messages do not tell where it looked when"
 
     @abstractmethod
     def parse(self, raw: bytes, counts: Counter[str]) -> Message:

@@ -15,11 +15,15 @@ from bentwing.recording.batches import LidarBatch
 from bentwing.recording.messages import wire, wire_scans
 from bentwing.recording.messages.decoder import LidarDecoder
 from bentwing.recording.messages.wire_scans import RawScan
+from bentwing.recording.scan_times import ScanReading, find_scan_turn
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
+
+    from bentwing.recording.point_times import GivenTimes
+    from bentwing.recording.sweep_stamps import SweepStamps
 
 REACH = 30.0  # m, of a usual 2D lidar
 MAX_SWEEP = 10.0  # s; a longer scan is a damaged time_increment
@@ -35,17 +39,42 @@ class LaserScans(LidarDecoder[RawScan]):
         self,
         messages: Sequence[bytes],
         stamps_ns: Sequence[int],  # noqa: ARG002 - clouds need them
-    ) -> tuple[str | None, None]:
+        given: GivenTimes,
+    ) -> tuple[str | None, ScanReading | None]:
         """Return the sentence on the first scan that can be read."""
+        given.refuse("are scans, which have no time field", "time_field", "time_unit")
+        if given.reference == "absolute":
+            given.refuse("are scans, whose beams count from the stamp", "time_reference")
+        scan = self._first(messages)
+        if scan is None or not has_beam_times(scan):
+            return None, None
+        said = f"time per beam: stamp + i * {scan.time_increment * 1e6:.4g} us"
+        if given.reference is None or given.reference == "start":
+            return said, None
+        reading = ScanReading.of(scan, given.reference)
+        return f"{said}, from {1e3 * reading.first:.2f} ms on", reading
+
+    def made_times(self, messages: Sequence[bytes], stamps: SweepStamps) -> ScanReading | str:
+        """Return how beams get times where the scans have none, or why they cannot."""
+        scan = self._first(messages)
+        return "no scan can be read" if scan is None else find_scan_turn(scan, stamps)
+
+    @property
+    def _times(self) -> ScanReading | None:
+        return self.reading if isinstance(self.reading, ScanReading) else None
+
+    def _first(self, messages: Sequence[bytes]) -> RawScan | None:
+        """Return the first scan with beams, else any that can be read."""
+        found = None
         for raw in messages:
             try:
                 scan = self.parse(raw, Counter())
             except wire.BrokenMessageError:
                 continue
-            if not has_beam_times(scan):
-                return None, None
-            return f"time per beam: stamp + i * {scan.time_increment * 1e6:.4g} us", None
-        return None, None
+            if len(scan.ranges) > 1:
+                return scan
+            found = found or scan
+        return found
 
     def parse(self, raw: bytes, counts: Counter[str]) -> RawScan:
         """Read a message; one without beams has no geometry that could be wrong."""
@@ -60,13 +89,14 @@ class LaserScans(LidarDecoder[RawScan]):
 
     def has_point_times(self, message: RawScan) -> bool:
         """Whether the time of each beam is known."""
-        return has_beam_times(message)
+        makes_them = self._times is not None and self._times.turn is not None
+        return makes_them or has_beam_times(message)
 
     def batches(
         self, messages: Sequence[RawScan], starts: NDArray[np.float64], counts: Counter[str]
     ) -> list[LidarBatch]:
         """Return the points in the scan plane."""
-        return points_of_scans(messages, starts, counts, self.range_scale)
+        return points_of_scans(messages, starts, counts, self.range_scale, self._times)
 
 
 class MultiEchoScans(LaserScans):
@@ -76,7 +106,7 @@ class MultiEchoScans(LaserScans):
 
 
 def has_beam_times(scan: RawScan) -> bool:
-    """Whether the time of each beam is known: `stamp + i * time_increment`."""
+    """Whether a scan tells the time of each beam: `stamp + i * time_increment`."""
     return scan.time_increment != 0.0 or len(scan.ranges) < 2
 
 
@@ -92,6 +122,7 @@ def points_of_scans(
     starts: NDArray[np.float64],
     counts: Counter[str],
     range_scale: float = 1.0,
+    reading: ScanReading | None = None,
 ) -> list[LidarBatch]:
     """Return the valid returns of consecutive scans, one batch per run of equal geometry.
 
@@ -101,12 +132,13 @@ def points_of_scans(
     starts : (S,) s, time of each scan's first beam
     counts : receives `returns` (all beams), `nan`, `inf`, `zero`, `out_of_range`
     range_scale : m per unit of the ranges
+    reading : of the beams' times, where the scans do not tell them all
     """
     batches = []
     pairs = zip(scans, starts.tolist(), strict=True)
     for _, run in itertools.groupby(pairs, key=lambda pair: _geometry(pair[0])):
         members, times = zip(*run, strict=True)
-        batches.append(_points_of_run(members, np.array(times), counts, range_scale))
+        batches.append(_points_of_run(members, np.array(times), counts, range_scale, reading))
     return batches
 
 
@@ -119,6 +151,7 @@ def _points_of_run(
     starts: NDArray[np.float64],
     counts: Counter[str],
     range_scale: float,
+    reading: ScanReading | None,
 ) -> LidarBatch:
     head = scans[0]
     shape = len(scans), len(head.ranges)
@@ -131,7 +164,10 @@ def _points_of_run(
     points = np.zeros((*shape, 3))
     np.multiply(cosines, distances, out=points[..., 0])
     np.multiply(sines, distances, out=points[..., 1])
-    times = starts[:, None] + np.arange(shape[1]) * head.time_increment
+    increment = head.time_increment
+    if reading is not None:
+        increment, starts = reading.increment(head), starts + reading.start(head)
+    times = starts[:, None] + np.arange(shape[1]) * increment
     intensity = None
     if head.intensities is not None:
         intensity = _joined([s.intensities for s in scans if s.intensities is not None])

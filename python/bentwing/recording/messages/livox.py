@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from bentwing.recording.point_times import GivenTimes
+
 MAX_OFFSET_NS = 1_000_000_000
 
 
@@ -36,8 +38,10 @@ class LivoxClouds(LidarDecoder[RawLivox]):
         self,
         messages: Sequence[bytes],  # noqa: ARG002 - all of them have times
         stamps_ns: Sequence[int],  # noqa: ARG002
+        given: GivenTimes,
     ) -> tuple[str, None]:
         """Return the sentence on the offsets."""
+        given.refuse("have the field offset_time", "time_field", "time_unit", "time_reference")
         return "time per point from offset_time (uint32): ns, relative to the time base", None
 
     def stamp_and_span(self, raw: bytes) -> tuple[int, float | None]:

@@ -13,6 +13,9 @@ from bentwing.recording.batches import LidarBatch
 from bentwing.recording.messages import wire_clouds
 from bentwing.recording.messages.decoder import LidarDecoder
 from bentwing.recording.messages.wire import BrokenMessageError
+from bentwing.recording.point_times import TimeReading
+from bentwing.recording.turn_finding import Sweep, find_turn
+from bentwing.recording.turn_times import TurnReading
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -20,7 +23,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bentwing.recording.messages.wire_clouds import RawCloud, RawField
-    from bentwing.recording.point_times import TimeReading
+    from bentwing.recording.point_times import GivenTimes, Reading
+    from bentwing.recording.sweep_stamps import SweepStamps
 
 DATATYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
 INTENSITY_NAMES = ("intensity", "intensities", "reflectivity", "signal")
@@ -28,12 +32,16 @@ RING_NAMES = ("ring", "channel", "line")
 
 
 class Columns(NamedTuple):
-    """Valid points of a cloud in the order of the message; `raw_times` as the sensor gives them."""
+    """Valid points of a cloud in the order of the message.
+
+    `raw_times` as the sensor gives them; `line` of an organized cloud that has no rings.
+    """
 
     points: NDArray[np.float64]
     raw_times: NDArray[np.generic] | None
     intensity: NDArray[np.float32] | None
     ring: NDArray[np.uint16] | None
+    line: NDArray[np.uint16] | None = None
 
 
 class Cloud(NamedTuple):
@@ -47,7 +55,7 @@ class PointClouds(LidarDecoder[Cloud]):
     """sensor_msgs/PointCloud2; without a reading all points have the header stamp."""
 
     def point_times(
-        self, messages: Sequence[bytes], stamps_ns: Sequence[int]
+        self, messages: Sequence[bytes], stamps_ns: Sequence[int], given: GivenTimes
     ) -> tuple[str | None, TimeReading | None]:
         """Decide on the last readable cloud; the first ones of a driver are often incomplete."""
         steps = np.diff(np.array(stamps_ns, dtype=np.int64))
@@ -55,22 +63,37 @@ class PointClouds(LidarDecoder[Cloud]):
         for raw in reversed(messages):
             try:
                 cloud = wire_clouds.point_cloud(raw, cdr=self.cdr)
-                raw_times = columns(cloud, Counter()).raw_times
+                raw_times = columns(cloud, Counter(), given.field).raw_times
             except BrokenMessageError:
                 continue
-            name = time_field(cloud)
+            name = time_field(cloud, given.field)
             if name is None or raw_times is None:
+                given.refuse(_without(cloud), "time_field", "time_unit")
                 continue
-            reading = point_times.decide(name, raw_times, cloud.stamp_ns, period)
+            reading = point_times.decide(name, raw_times, cloud.stamp_ns, period, given)
             if reading is not None:
                 return str(reading), reading
+        given.refuse("have none that varies as the times of a sweep do", "time_field", "time_unit")
         return None, None
+
+    def made_times(self, messages: Sequence[bytes], stamps: SweepStamps) -> TurnReading | str:
+        """Return how points get times by the turn of the lidar, or why they cannot."""
+        sweeps = []
+        for raw in messages:
+            try:
+                found = self.parse(raw, Counter()).columns
+            except BrokenMessageError:
+                continue
+            sweeps.append(Sweep(found.points, found.line if found.ring is None else found.ring))
+        return find_turn(sweeps, stamps)
 
     def stamp_and_span(self, raw: bytes) -> tuple[int, float | None]:
         """Return the stamp of a message, ns, and the time from its first to its last point, s."""
         cloud = wire_clouds.point_cloud(raw, cdr=self.cdr)
-        name = time_field(cloud)
-        if name is None or self.reading is None:
+        if not isinstance(self.reading, TimeReading):
+            return cloud.stamp_ns, None
+        name = time_field(cloud, self.reading.name)
+        if name is None:
             return cloud.stamp_ns, None
         offsets = self.reading.offsets(_native(_table(cloud).reshape(-1)[name]), cloud.stamp_ns)
         known = offsets[np.isfinite(offsets)]
@@ -79,7 +102,8 @@ class PointClouds(LidarDecoder[Cloud]):
     def parse(self, raw: bytes, counts: Counter[str]) -> Cloud:
         """Read a message."""
         cloud = wire_clouds.point_cloud(raw, cdr=self.cdr)
-        return Cloud(cloud.stamp_ns, columns(cloud, counts))
+        name = self.reading.name if isinstance(self.reading, TimeReading) else None
+        return Cloud(cloud.stamp_ns, columns(cloud, counts, name))
 
     def batches(
         self, messages: Sequence[Cloud], starts: NDArray[np.float64], counts: Counter[str]
@@ -92,18 +116,23 @@ class PointClouds(LidarDecoder[Cloud]):
         ]
 
 
-def time_field(cloud: RawCloud) -> str | None:
-    """Return the name of the field that holds the points' times, if there is one."""
-    return _find(_usable_fields(cloud), point_times.NAMES)
+def time_field(cloud: RawCloud, name: str | None = None) -> str | None:
+    """Return the name of the field that holds the points' times, if there is one: `name`, or a usual one."""
+    return _find(_usable_fields(cloud), point_times.NAMES if name is None else (name.lower(),))
 
 
-def columns(cloud: RawCloud, counts: Counter[str]) -> Columns:
+def _without(cloud: RawCloud) -> str:
+    return f"have the fields {', '.join(_usable_fields(cloud)) or 'none'}"
+
+
+def columns(cloud: RawCloud, counts: Counter[str], times: str | None = None) -> Columns:
     """Return the valid points of a cloud.
 
     Parameters
     ----------
     cloud : the message
     counts : receives `returns` (all points), `nan`, `inf`, `zero`
+    times : name of the time field; None: a usual one
 
     Raises
     ------
@@ -122,30 +151,45 @@ def columns(cloud: RawCloud, counts: Counter[str]) -> Columns:
     keep = valid(points, counts)
     if not keep.all():
         points, table = points[keep], table[keep]
-    time, intensity, ring = (
-        _find(names, group) for group in (point_times.NAMES, INTENSITY_NAMES, RING_NAMES)
-    )
+    intensity, ring = (_find(names, group) for group in (INTENSITY_NAMES, RING_NAMES))
+    time = time_field(cloud, times)
     return Columns(
         points,
         None if time is None else _native(table[time]),
         None if intensity is None else table[intensity].astype(np.float32),
         None if ring is None else _rings(table[ring]),
+        _lines(cloud)[keep] if ring is None and cloud.height > 1 else None,
     )
 
 
+def _lines(cloud: RawCloud) -> NDArray[np.uint16]:
+    """Return the line of each point of an organized cloud: its beam, of which there are fewer."""
+    lines = np.indices((cloud.height, cloud.width), dtype=np.uint16)
+    return np.ravel(lines[0 if cloud.height <= cloud.width else 1])
+
+
 def sweep(
-    cols: Columns, reading: TimeReading | None, stamp_ns: int, start: float, counts: Counter[str]
+    cols: Columns,
+    reading: Reading | None,
+    stamp_ns: int,
+    start: float,
+    counts: Counter[str],
 ) -> LidarBatch:
     """Return the points with times, sorted.
 
     Parameters
     ----------
     cols : valid points
-    reading : how to read the time field; None puts every point at the header stamp
+    reading : how to read the time field, or to make times; None puts every point at the header stamp
     stamp_ns, start : header stamp, in ns and in s since the recording's start
     counts : receives `bad_point_time`, points more than a second from their header
     """
-    if reading is None or cols.raw_times is None:
+    if isinstance(reading, TurnReading):
+        groups = cols.line if cols.ring is None else cols.ring
+        offsets = reading.offsets(cols.points, groups)
+        batch = LidarBatch(cols.points, start + offsets, cols.intensity, cols.ring)
+        return batch.where(np.argsort(offsets, kind="stable"))
+    if not isinstance(reading, TimeReading) or cols.raw_times is None:
         times = np.full(len(cols.points), start)
         return LidarBatch(cols.points, times, cols.intensity, cols.ring)
     offsets = reading.offsets(cols.raw_times, stamp_ns)

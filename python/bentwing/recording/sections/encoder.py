@@ -6,11 +6,12 @@ from __future__ import annotations
 from typing import Annotated, Literal, TypeAlias
 
 import numpy as np
-from pydantic import Field, field_validator
+from pydantic import Field, field_validator, model_validator
 
 from bentwing.recording.sections.section import (
     Angle,
     ClockOffset,
+    FromTf,
     Offset,
     Section,
     Topic,
@@ -33,6 +34,7 @@ class Encoder(Section):
     ----------
     topic : None for the only JointState topic in the recording
     joint : which joint of the messages it is; None: the first
+    from_tf : parent and child of the joint whose motion in /tf is the angle, instead of a JointState
     unit : of the positions in the recording, rad or deg
     sign : 1, or -1 where the positions grow against the turn of `axis`
     clock_offset : s, added to its stamps before all else: for a clock that counts from power-on
@@ -47,6 +49,7 @@ class Encoder(Section):
 
     topic: Topic | None = None
     joint: Annotated[str, Field(min_length=1)] | None = None
+    from_tf: FromTf | None = None
     unit: AngleUnit = "rad"
     sign: Literal[1, -1] = 1
     clock_offset: ClockOffset = 0.0
@@ -62,6 +65,13 @@ class Encoder(Section):
     def places_motor(self) -> bool:
         """Whether the motor's pose on the IMU, or the lidar's on the motor, is given."""
         return bool(self.model_fields_set & {"T_imu_motor", "T_motor_lidar"})
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Encoder:
+        if self.from_tf is not None and (self.joint is not None or self.unit != "rad"):
+            msg = "from_tf reads the angle from /tf in rad: leave joint and unit out"
+            raise ValueError(msg)
+        return self
 
     @field_validator("axis")
     @classmethod

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import os
-from typing import Annotated, Any, get_args
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
@@ -19,6 +19,8 @@ from bentwing.recording.sections.section import NonNegative, Offset, Positive, S
 MAX_ESTIMATED_LATENCY = 0.05
 
 
+TimeUnit = Literal["s", "ms", "us", "ns"]
+TimeReference = Literal["start", "middle", "end", "absolute"]
 FARTHEST = 10_000.0  # m; beams are followed cell by cell to their ends
 
 
@@ -33,6 +35,10 @@ class Lidar(Section):
     metadata : JSON file of an Ouster, relative to the payload file, where the recording has none
     min_range, max_range : m, closest and farthest return that is kept; default: by `kind`
     range_sigma : m, one standard deviation of a range; default: by `kind`
+    time_field : of its clouds, with the time of each point; None: found by its name
+    time_unit : of that field; None: found from its values
+    time_reference : which moment of a sweep its stamp tells (start, middle or end), or absolute where the
+        times count from the epoch or power-on and need no stamp; None: found
     latency : s, its stamps minus the IMU's clock; estimators start from it
     mirrored : its scans run the other way: y of every point is negated
     range_scale : m per unit of the ranges in the recording; 0.001 for millimetres
@@ -47,6 +53,9 @@ class Lidar(Section):
     min_range: Annotated[NonNegative, Unit("m")] = 0.0
     max_range: Annotated[Positive, Field(le=FARTHEST), Unit("m")] = 0.0
     range_sigma: Annotated[Positive, Unit("m, one standard deviation")] = 0.0
+    time_field: Annotated[str, Field(min_length=1)] | None = None
+    time_unit: TimeUnit | None = None
+    time_reference: TimeReference | None = None
     latency: Offset = 0.0
     mirrored: bool = False
     range_scale: Annotated[Positive, Unit("m per unit of the recording")] = 1.0

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -11,6 +12,7 @@ from pydantic import (
     ConfigDict,
     Field,
     SerializerFunctionWrapHandler,
+    ValidationInfo,
     field_validator,
     model_serializer,
     model_validator,
@@ -19,6 +21,7 @@ from pydantic import (
 from bentwing.base.errors import PayloadError
 from bentwing.base.mount import Pose
 from bentwing.base.units import Unit
+from bentwing.recording.link_chain import QUATERNION_TOLERANCE
 from bentwing.recording.sections.transform_forms import OTHER_FORMS, as_quaternion
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -35,7 +38,6 @@ Lever = Annotated[Vector, Unit("m")]
 Topic = Annotated[str, Field(min_length=1)]
 
 MAX_LEVER = 10.0  # m; a sensor farther away on the same carrier is a mistake of units
-QUATERNION_TOLERANCE = 1e-3  # rounding to three digits is repaired, anything worse is refused
 
 
 class Section(BaseModel):
@@ -89,8 +91,9 @@ class Transform(Section):
 
     @model_validator(mode="before")
     @classmethod
-    def _of_any_form(cls, given: Any) -> Any:  # noqa: ANN401 - whatever the file holds
-        return as_quaternion(given) if isinstance(given, dict) else given
+    def _of_any_form(cls, given: Any, info: ValidationInfo) -> Any:  # noqa: ANN401 - whatever the file holds
+        folder = (info.context or {}).get("folder", Path())
+        return as_quaternion(given, folder) if isinstance(given, dict) else given
 
     @model_serializer(mode="wrap")
     def _as_given(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:

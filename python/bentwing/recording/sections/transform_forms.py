@@ -8,20 +8,28 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bentwing.base import geometry
+from bentwing.recording.urdf import urdf_transform
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from numpy.typing import NDArray
 
-OTHER_FORMS = ("rpy", "rpy_deg", "matrix")
+OTHER_FORMS = ("rpy", "rpy_deg", "matrix", "from_urdf")
 ROTATIONS = ("quaternion", *OTHER_FORMS, "from_tf")
-COMPLETE = ("matrix", "from_tf")  # these have the translation in them
+COMPLETE = ("matrix", "from_tf", "from_urdf")  # these have the translation in them
+URDF_KEYS = ("file", "parent", "child")
 MAX_SKEW = 2e-3  # of RᵀR from the identity; rounding to three digits is repaired, worse is refused
 MAX_ROW_ERROR = 1e-6  # of the last row of a matrix
 MAX_TURN = 2 * np.pi  # rad; beyond it an angle is in degrees
 
 
-def as_quaternion(given: dict[str, Any]) -> dict[str, Any]:
+def as_quaternion(given: dict[str, Any], folder: Path) -> dict[str, Any]:
     """Return the keys of a transform with its rotation as quaternion; what else is there stays.
+
+    Parameters
+    ----------
+    folder : of the payload file, from which the files that it names are found
 
     Raises
     ------
@@ -39,10 +47,20 @@ def as_quaternion(given: dict[str, Any]) -> dict[str, Any]:
     if form not in OTHER_FORMS:
         return given
     rest = {name: value for name, value in given.items() if name != form}
+    if form == "from_urdf":
+        return rest | _of_urdf(given[form], folder)
     if form == "matrix":
         R, t = _rigid(given[form])
         return rest | {"translation": t.tolist(), "quaternion": _listed(geometry.from_matrices(R))}
     return rest | {"quaternion": _listed(geometry.from_rpy(_angles(form, given[form])))}
+
+
+def _of_urdf(given: Any, folder: Path) -> dict[str, list[float]]:  # noqa: ANN401 - whatever the file holds
+    is_whole = isinstance(given, dict) and set(given) == set(URDF_KEYS)
+    if not is_whole or not all(isinstance(word, str) and word for word in given.values()):
+        msg = f"from_urdf names file, parent and child, found {str(given)[:60]}"
+        raise ValueError(msg)
+    return urdf_transform(folder / given["file"], given["parent"], given["child"])
 
 
 def _angles(form: str, given: Any) -> NDArray[np.float64]:  # noqa: ANN401 - whatever the file holds

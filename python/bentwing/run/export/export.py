@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import gettempdir
 from typing import TYPE_CHECKING
@@ -18,6 +18,7 @@ from bentwing.map.write_tiles import write_tiles
 from bentwing.map.writer import open_map
 from bentwing.recording.preprocess.read_ahead import read_ahead
 from bentwing.run.export.finished import Finished
+from bentwing.run.export.mcap_file import SPACING, SUFFIX, write_mcap
 from bentwing.run.export.points import Points, Wish
 from bentwing.run.export.trajectory_files import SUFFIXES, Named, format_of, write_trajectory
 
@@ -95,7 +96,7 @@ def export(
     ----------
     run : folder of a run, a localized run or a merged map
     path : of the file, which must not exist; its suffix says the format. With `tiles`, a folder of that
-        name without the suffix
+        name without the suffix. `.mcap` has trajectory and map as messages of ROS 2
     spacing : m, edge of the voxels that keep one point each; 0 for all points; default: those of the map
     crop : what is kept; default: all
     polygon : GeoJSON or DXF file with areas, inside of which points are kept
@@ -124,6 +125,8 @@ def export(
     if trajectory_format is not None and map_format is not None:
         msg = f"a trajectory ({trajectory_format}) and a map ({map_format}) are two files; export twice"
         raise UsageError(msg)
+    if kind is None and map_format is None and out.suffix.lower() == SUFFIX:
+        return _export_messages(run, out, wish, tiles, threads=threads, progress=shown)
     if kind is not None:
         if wish != Wish() or tiles is not None:
             msg = f"{out}: is a trajectory, of which spacing, crop, coordinates and tiles cannot be chosen"
@@ -189,6 +192,29 @@ def export_points(
     return points.chunks(Path(gettempdir()), threads=threads, progress=progress)
 
 
+def _export_messages(
+    run: Run | Path | str,
+    out: Path,
+    wish: Wish,
+    tiles: int | None,
+    *,
+    threads: int | None,
+    progress: Progress,
+) -> Exported:
+    if wish.epsg is not None or tiles is not None:
+        msg = f"{out}: messages are in the frame of the trajectory and in one file; leave --epsg and --tiles out"
+        raise UsageError(msg)
+    _require_new(out)
+    finished = Finished.open(run)
+    spacing = max(SPACING, finished.spacing) if wish.spacing is None else wish.spacing
+    points = Points.of(finished, replace(wish, spacing=spacing, local=True))
+    progress.note(f"export: {points.origin}")
+    counts: dict[str, int] = {}
+    chunks = points.chunks(out.parent, threads=threads, progress=progress, counts=counts)
+    n_points = write_mcap(out, finished, _some(chunks))
+    return Exported((out,), n_points, points.origin, counts)
+
+
 def _export_trajectory(run: Finished, out: Path, kind: TrajectoryFormat) -> Exported:
     named = [Named(name, poses, run.start_ns[name]) for name, poses in run.trajectories.items()]
     paths = [out]
@@ -218,7 +244,7 @@ def _map_format_of(path: Path) -> MapFormat:
     listed = ", ".join(f".{name}" for name in FORMATS)
     msg = (
         f"{path}: its name says no format; end it in {listed} for a map, or in {', '.join(SUFFIXES)} "
-        "for a trajectory"
+        f"for a trajectory, or in {SUFFIX} for both as messages"
     )
     raise UsageError(msg)
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydantic import ValidationError
 
+from bentwing.base.calibration import Calibration
 from bentwing.base.errors import InputError, UsageError
 from bentwing.base.run_record import finished_record, understood
 from bentwing.map.clean import CleanSettings
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from bentwing.base.covariances import PoseCovariances
+    from bentwing.base.mount import Mount
     from bentwing.base.trajectory import Trajectory
 
 _REACH = 300.0  # m, of a lidar of which the record says nothing
@@ -40,6 +43,7 @@ class Finished:
     trajectories : by the names of the runs, in the frame of the trajectory; one without merging
     start_ns : by the names of the runs, time zero of their recordings, ns UTC
     coordinates : of the map
+    covariances : of the trajectories, None where the estimator has none
     """
 
     folder: Path
@@ -47,6 +51,7 @@ class Finished:
     trajectories: dict[str, Trajectory]
     start_ns: dict[str, int]
     coordinates: Coordinates
+    covariances: dict[str, PoseCovariances | None]
 
     @classmethod
     def open(cls, run: Run | Path | str) -> Finished:
@@ -67,15 +72,23 @@ class Finished:
                 {**record, "name": folder.resolve().name, "trajectory": "trajectory.txt"}
             ]
             _require_clock(folder, parts)
-            poses = {}
+            poses, covariances = {}, {}
             for part in parts:
                 estimate = estimate_of(folder, part, part["trajectory"])
                 poses[part["name"]] = estimate.trajectory.within(estimate.segments)
+                # Beside a merged map there are none of its runs.
+                covariances[part["name"]] = estimate.covariances if len(parts) == 1 else None
             starts = {part["name"]: int(part["start_ns"]) for part in parts}
             reach = _reach_of(record)
             path = np.concatenate([trajectory.positions for trajectory in poses.values()])
             low, high = path.min(axis=0) - reach, path.max(axis=0) + reach
-            return cls(folder, record, poses, starts, Coordinates.of_record(record, low, high))
+            coordinates = Coordinates.of_record(record, low, high)
+            return cls(folder, record, poses, starts, coordinates, covariances)
+
+    @property
+    def mount(self) -> Mount:
+        """How the lidar is mounted on the IMU, of a run that is not merged."""
+        return Calibration.from_json(self.record["calibration"]).mount
 
     @property
     def origin_ns(self) -> int:

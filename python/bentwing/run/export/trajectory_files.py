@@ -60,7 +60,7 @@ def write_trajectory(
     elif kind == "euroc":
         write_text(path, _euroc(poses, start_ns))
     else:
-        shown = poses[_every(poses.times)]
+        shown = poses[every(poses.times, _STEP)]
         places = coordinates.degrees(shown.positions)
         stamps = [_iso(int(stamp)) for stamp in Clock(start_ns).to_ns(shown.times)]
         write = _kml if kind == "kml" else _geojson
@@ -133,9 +133,9 @@ def _kml(name: str, places: NDArray[np.float64], stamps: list[str]) -> str:
     )
 
 
-def _every(times: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Return the first pose in each step of time, and the last pose."""
-    steps = np.floor((times - times[0]) / _STEP + 1e-6)  # stamps in files are rounded
+def every(times: NDArray[np.float64], step: float) -> NDArray[np.bool_]:
+    """Return the first pose in each step of time, s, and the last pose."""
+    steps = np.floor((times - times[0]) / step + 1e-6)  # stamps in files are rounded
     chosen = np.append(True, np.diff(steps) > 0)
     chosen[-1] = True
     return chosen

@@ -6,13 +6,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from bentwing.base.errors import UsageError
-from bentwing.simulate.faults import clocks, imus, inertial, mounts, ranging, turning
+from bentwing.simulate.faults import clocks, imus, inertial, mounts, ranging, turning, untimed
 
 if TYPE_CHECKING:
     from bentwing.simulate.faults.fault import Fault
     from bentwing.simulate.names import HeadName
 
-_FAMILIES = (mounts, inertial, imus, clocks, ranging, turning)
+_FAMILIES = (mounts, inertial, imus, clocks, ranging, turning, untimed)
 FAULTS: dict[str, Fault] = {fault.name: fault for family in _FAMILIES for fault in family.FAULTS}
 
 

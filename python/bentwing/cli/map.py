@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from bentwing.base.new_file import require_new
 from bentwing.cli import options
 from bentwing.cli.command import PRINT_SETTINGS
 
@@ -97,7 +98,8 @@ def command(
     if print_settings:
         typer.echo(chosen.to_yaml(), nl=False)
         return
-    options.require_new_file(write_payload)
+    if write_payload is not None:
+        require_new(write_payload)
     progress = create_progress(quiet=quiet)
     flights = flights_of(recording) if len(recording) > 1 else [recording]
     if len(flights) > 1:

@@ -9,6 +9,7 @@ from typing import Any
 
 from bentwing.base.errors import UsageError
 from bentwing.base.run_record import RECORD, finished_record
+from bentwing.map.finished_run import map_of
 from bentwing.map.formats import MAP_SUFFIXES
 
 
@@ -47,11 +48,9 @@ def find_subject(path: Path | str) -> Subject:
     if path.is_file():
         is_map = path.suffix.lower() in MAP_SUFFIXES
         return Subject(None if is_map else path, None, path if is_map else None)
-    maps = [path / f"map{suffix}" for suffix in MAP_SUFFIXES]
     poses = [path / "trajectory.txt", path / "odometry.txt"]
     trajectory, odometry = (file if file.is_file() else None for file in poses)
-    map_path = next((file for file in maps if file.is_file()), None)
-    found = Subject(trajectory, odometry, map_path, _georeference(path))
+    found = Subject(trajectory, odometry, map_of(path), _georeference(path))
     if not found.files():
         what = "has neither trajectory.txt nor map.laz" if path.is_dir() else "does not exist"
         msg = (

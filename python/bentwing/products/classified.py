@@ -73,7 +73,7 @@ def _other_parts(source: FinishedMap) -> Iterator[laspy.LasHeader | laspy.ScaleA
     header.global_encoding.gps_time_type = laspy.header.GpsTimeType.STANDARD
     header.add_extra_dim(_HEIGHT)
     yield header
-    begin = adjusted_gps_origin(source.start_ns)
+    begin = adjusted_gps_origin(source.run.start_ns)
     for part in source.parts():
         record = laspy.ScaleAwarePointRecord.zeros(len(part.points), header=header)
         record.x, record.y, record.z = (part.points + source.origin).T

@@ -1,5 +1,4 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-import json
 import re
 from xml.etree import ElementTree as ET
 

@@ -97,7 +97,11 @@ def evaluate(
         If a file cannot be used, or a reference does not fit.
     """
     question, progress = question or Question(), as_progress(progress)
-    _require_counterparts(subject, question)
+    if question.reference_trajectory is not None:
+        subject = subject.flown_with(question.reference_trajectory)
+    if question.reference_map is not None and subject.map_path is None:
+        msg = "there is no map to compare with --reference-map"
+        raise UsageError(msg)
     result = Evaluation()
     path = _trajectory(subject, question, progress, result)
     if subject.map_path is None:
@@ -116,15 +120,6 @@ def evaluate(
         with progress.stage("comparing the map with the reference"):
             _map(cloud, reference, path, question, result)
     return result
-
-
-def _require_counterparts(subject: Subject, question: Question) -> None:
-    if question.reference_trajectory is not None and subject.trajectory is None:
-        msg = "there is no trajectory to compare with --reference-trajectory"
-        raise UsageError(msg)
-    if question.reference_map is not None and subject.map_path is None:
-        msg = "there is no map to compare with --reference-map"
-        raise UsageError(msg)
 
 
 def _trajectory(

@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bentwing.base.trajectory import Trajectory
+from bentwing.map.change import Change
 from bentwing.map.finished_run import FinishedRun
 from bentwing.map.measured import moved_back
+from bentwing.map.read import read_parts
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -20,6 +22,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
+_CHANGES = ("appeared", "disappeared")
 _PAUSE = 10.0  # s between runs that follow each other, as where they were merged
 
 
@@ -71,6 +74,21 @@ class ShownRun:
             times = times + late[number]
             shift = next(shifts)
             yield self._measured(part.points, times, shift) if measured else part.points, times
+
+    def change(self) -> Change | None:
+        """Return what has changed since the map in which the run was localized; None of other runs.
+
+        Raises
+        ------
+        InputError
+        """
+        files = [self.run.folder / name for name in self.run.record["files"]]
+        found = {path.stem: path for path in files if path.stem in _CHANGES and path.is_file()}
+        if len(found) < len(_CHANGES):
+            return None
+        placed = self.run.record.get("georeference")
+        clouds = [[p.points for p in read_parts(found[name], placed)] for name in _CHANGES]
+        return Change(*(np.concatenate([np.empty((0, 3)), *parts]) for parts in clouds))
 
     def _measured(self, points: Array, times: Array, shifts: NDArray[Any]) -> Array:
         """Return points before they were moved along their beams; the lidar is nearly where the IMU is."""

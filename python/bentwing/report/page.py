@@ -12,6 +12,7 @@ from bentwing.report import evidence
 from bentwing.report.cover import cover, title_of
 from bentwing.report.drawn import Drawn
 from bentwing.report.engineering import engineering_section
+from bentwing.report.localization import localization_section
 from bentwing.report.merging import merging_section
 from bentwing.report.on_earth import on_earth_section
 from bentwing.report.texts import ENGLISH, Texts
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 
     from bentwing.base.trajectory import Trajectory
     from bentwing.evaluate.revisits import Revisits
+    from bentwing.map.change import Change
     from bentwing.report.engineering import Spin
 
 
@@ -35,6 +37,7 @@ def write_report(
     trajectory: Trajectory,
     map_sample: tuple[NDArray[np.float64], NDArray[np.float64]],
     revisits: Revisits | None = None,
+    change: Change | None = None,
     spin: Spin | None = None,
     cost: Callable[[], Mapping[str, Any]] | None = None,
     texts: Texts = ENGLISH,
@@ -48,6 +51,7 @@ def write_report(
     trajectory : of the IMU in the map; may be empty after a failure
     map_sample : points (N, 3) m in the map and their times (N,) s; may be empty
     revisits : how well what was seen twice agrees in the map
+    change : what has changed since the map in which the recording was localized
     spin : times (M,) s and rate of turn (M,) rad/s of the sensor head
     cost : what run.json will say of time and memory, asked once all is drawn; default: what it says now
     texts : words of the language
@@ -58,6 +62,7 @@ def write_report(
         evidence.map_section(drawn),
         evidence.coverage_section(drawn),
         evidence.agreement_section(*map_sample, revisits, texts),
+        localization_section(drawn, change),
         on_earth_section(run_json.get("georeference")),
         merging_section(run_json.get("merging")),
     ]

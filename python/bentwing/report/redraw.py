@@ -75,6 +75,7 @@ def redraw_report(
                 trajectory=finished.trajectory,
                 map_sample=(points, times),
                 revisits=revisit_consistency(points, times) if len(points) else None,
+                change=finished.change(),
             )
         written = [folder / PAGE]
         if browser is not None:

@@ -40,6 +40,7 @@ def command(
             options.ESTIMATION, "--no-loop-closure", help="Leave the trajectory open-loop."
         ),
     ] = False,
+    loops: options.Loops = None,
     no_map: Annotated[
         bool,
         options.option(
@@ -73,6 +74,7 @@ def command(
     from bentwing.base.errors import UsageError
     from bentwing.base.progress import create_progress
     from bentwing.cli.done import say_maps, say_run
+    from bentwing.closing.loop_file import read_loops
     from bentwing.recording.flights import flights_of
     from bentwing.recording.sections.project import Project
     from bentwing.run.choose import choose, given
@@ -86,6 +88,7 @@ def command(
         refine=False if no_refine else None,
         georeferencing=given(mode=georeference, epsg=epsg, control_points=control_points),
         loop_closure=False if no_loop_closure else None,
+        loops=None if loops is None else read_loops(loops),
         writes_map=False if no_map else None,
         project=None if project is None else Project.load(project),
         threads=threads,

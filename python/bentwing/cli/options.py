@@ -205,6 +205,15 @@ Force = Annotated[
     option(INPUT, "--force", help="Map a recording that `bentwing info` calls unfit."),
 ]
 
+Loops = Annotated[
+    Path | None,
+    option(
+        ESTIMATION,
+        metavar="FILE",
+        help="YAML of pairs of times at which the same place was seen, or was not.",
+    ),
+]
+
 Threads = Annotated[
     int | None,
     option(

@@ -66,7 +66,8 @@ def close(job: Job, found: Found) -> Found:
         open_loop = _known(found)
     with job.folder.stage("loops"), job.progress.stage("loops", part.length) as shown:
         batches = part.batches(shown, Counter())  # the first pass has counted what is dropped
-        if len(open_loop.segments) > 1 and job.prior is None:
+        is_cut = len(open_loop.segments) > 1
+        if (is_cut or job.settings.loops) and job.prior is None:
             from bentwing.closing.joining.segments import close_segments
 
             closed, merging = close_segments(
@@ -75,9 +76,10 @@ def close(job: Job, found: Found) -> Found:
                 part.payload,
                 settings=closing,
                 budget=budget,
+                loops=job.settings.loops,
                 threads=threads,
             )
-            found = replace(found, merging=merging)
+            found = replace(found, merging=merging if is_cut else None)
         else:
             near = None if job.prior is None else job.prior.surfels_near(open_loop.trajectory)
             closed = close_loops(

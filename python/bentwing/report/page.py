@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-from html import escape
-from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
 from bentwing.base.atomic import write_text
@@ -12,6 +10,7 @@ from bentwing.report import evidence
 from bentwing.report.cover import cover, title_of
 from bentwing.report.drawn import Drawn
 from bentwing.report.engineering import engineering_section
+from bentwing.report.html_page import html_page
 from bentwing.report.localization import localization_section
 from bentwing.report.merging import merging_section
 from bentwing.report.on_earth import on_earth_section
@@ -68,11 +67,5 @@ def write_report(
     ]
     described = {**run_json, **cost()} if cost is not None else run_json
     parts.append(engineering_section(described, trajectory, spin, texts))
-    style = files("bentwing.report").joinpath("style.css").read_text(encoding="utf-8")
-    page = (
-        f'<!doctype html>\n<html lang="{texts.language}"><head><meta charset="utf-8">'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<title>{escape(title_of(run_json, texts))}</title><style>{style}</style></head>"
-        f"<body><main>{''.join(parts)}</main></body></html>\n"
-    )
+    page = html_page(title_of(run_json, texts), "".join(parts), texts.language)
     write_text(path, page)

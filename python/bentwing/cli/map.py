@@ -33,6 +33,8 @@ def command(
     no_refine: options.NoRefine = False,
     georeference: options.Georeference = None,
     epsg: options.Epsg = None,
+    gnss: options.Gnss = None,
+    gnss_time: options.GnssTime = None,
     control_points: options.ControlPoints = None,
     no_loop_closure: Annotated[
         bool,
@@ -86,7 +88,13 @@ def command(
         map_spacing=map_spacing,
         cleaning=options.cleaning(keep_mixed=keep_mixed, keep_moving=keep_moving),
         refine=False if no_refine else None,
-        georeferencing=given(mode=georeference, epsg=epsg, control_points=control_points),
+        georeferencing=given(
+            mode=georeference,
+            epsg=epsg,
+            fixes=gnss,
+            fixes_time=gnss_time,
+            control_points=control_points,
+        ),
         loop_closure=False if no_loop_closure else None,
         loops=None if loops is None else read_loops(loops),
         writes_map=False if no_map else None,

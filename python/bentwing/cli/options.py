@@ -12,6 +12,7 @@ from bentwing.base.threads import MOST_THREADS
 from bentwing.closing.georeference.names import GeoreferenceMode
 from bentwing.map.formats import MapFormat
 from bentwing.odometry.names import EstimatorName
+from bentwing.recording.gnss_files.names import TimeScale
 
 # The groups of a help page, in its order.
 INPUT = "Input"
@@ -164,6 +165,25 @@ Epsg = Annotated[
         min=1,
         show_default="UTM zone",
         help="Projected system of the map.",
+    ),
+]
+Gnss = Annotated[
+    Path | None,
+    option(
+        EARTH,
+        "--gnss",
+        metavar="FILE",
+        show_default="topic in payload.yaml",
+        help="GNSS fixes from a file: solution of RTKLIB (.pos), or NMEA 0183 with GGA.",
+    ),
+]
+GnssTime = Annotated[
+    TimeScale | None,
+    option(
+        EARTH,
+        "--gnss-time",
+        show_default="what the file says",
+        help="Time scale of that file; GPS is ahead of UTC by the leap seconds.",
     ),
 ]
 ControlPoints = Annotated[

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bentwing.base.errors import InputError, UsageError
+from bentwing.base.gps_time import adjusted_gps_origin
 from bentwing.base.run_record import finished_record, understood
 from bentwing.base.trajectory import Trajectory, read_tum
 from bentwing.map.formats import MAP_SUFFIXES
-from bentwing.map.gps_time import adjusted_gps_origin
 from bentwing.map.read import MapPart, read_parts
 
 if TYPE_CHECKING:

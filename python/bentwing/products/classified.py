@@ -10,7 +10,7 @@ import laspy
 import numpy as np
 
 from bentwing.base.atomic import atomic_path
-from bentwing.map.gps_time import adjusted_gps_origin
+from bentwing.base.gps_time import adjusted_gps_origin
 from bentwing.map.las_bounds import require_sound_las
 from bentwing.map.read_rows import PART
 from bentwing.map.write_las import SCALE

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bentwing.base.errors import UsageError
+from bentwing.base.gps_time import adjusted_gps_origin
 from bentwing.base.run_record import finished_record
 from bentwing.base.trajectory import Trajectory, read_tum
 from bentwing.closing.places.cut import describe_parts
@@ -17,7 +18,6 @@ from bentwing.closing.places.settings import PlaceSettings
 from bentwing.closing.places.stream import PartStream
 from bentwing.closing.places.tiles import tiled
 from bentwing.map.finished_run import map_of
-from bentwing.map.gps_time import adjusted_gps_origin
 from bentwing.map.read import read_parts
 
 if TYPE_CHECKING:

@@ -144,7 +144,8 @@ def _judged(
     match = Match(a, b, candidate, place_a, place_b, reason, is_named=True)
     is_seen = candidate.alignment is None or candidate.alignment.n_pairs > 0
     at = middles if is_seen else loop.times
-    return Named(loop, match, at, said if reason is None else f"not used: {said}")
+    doubt = f"not used: what both times saw does not fit ({said})"
+    return Named(loop, match, at, said if reason is None else doubt)
 
 
 def _as_given(T: Matrix, a: Place, b: Place) -> tuple[Candidate, str]:

@@ -103,6 +103,8 @@ def command(
     progress, console = create_progress(quiet=quiet), Console()
     if table and out is not None:
         compared = compare_into(out, runs, question, progress)
+        for failure in compared.failures:
+            typer.echo(f"bentwing: error: {failure}", err=True)
         if not quiet:
             wide = Console(width=max(console.width, _WIDTH))
             wide.print(table_of(compared.head, compared.rows))

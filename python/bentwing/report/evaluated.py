@@ -48,7 +48,7 @@ def compare_into(
 ) -> EvaluationTable:
     """Evaluate runs into folders of their names in a folder, with table.csv, .json and .html of all.
 
-    A run that cannot be evaluated gets an empty row, and its reason is told.
+    A run that cannot be evaluated gets an empty row; `failures` of the table has the reason.
 
     Raises
     ------
@@ -61,15 +61,16 @@ def compare_into(
         msg = f"{len(runs)} runs: {', '.join(twice)} is the name of several; rename a folder"
         raise UsageError(msg)
     found: list[Evaluation | None] = []
+    failures: list[str] = []
     with EvaluationFolder(out, question.files()) as folder:
         for run, name in zip(runs, names, strict=True):
             is_last_hope = len(found) == len(runs) - 1 and not any(found)
             found.append(
                 evaluate_into(folder.path / name, run, question, progress)
                 if is_last_hope
-                else _if_possible(folder.path / name, run, question, progress)
+                else _if_possible(folder.path / name, run, question, progress, failures)
             )
-        table = EvaluationTable(names, found)
+        table = EvaluationTable(names, found, failures)
         written = {
             "table.csv": table.to_csv(),
             "table.json": json.dumps(table.to_json(), indent=1) + "\n",
@@ -82,10 +83,14 @@ def compare_into(
 
 
 def _if_possible(
-    out: Path, run: Path, question: Question, progress: Progress | None
+    out: Path,
+    run: Path,
+    question: Question,
+    progress: Progress | None,
+    failures: list[str],
 ) -> Evaluation | None:
     try:
         return evaluate_into(out, run, question, progress)
     except BentwingError as error:
-        as_progress(progress).note(f"warning: {out.name}: {error}")
+        failures.append(f"{out.name}: {error}")
         return None

@@ -106,10 +106,20 @@ class EvaluationTable:
     ----------
     names : of the runs
     evaluations : of them; None where that failed
+    failures : sentences, why
+
+    Attributes
+    ----------
+    failures : as given
     """
 
-    def __init__(self, names: Sequence[str], evaluations: Sequence[Evaluation | None]) -> None:
-        self._names = names
+    def __init__(
+        self,
+        names: Sequence[str],
+        evaluations: Sequence[Evaluation | None],
+        failures: Sequence[str] = (),
+    ) -> None:
+        self._names, self.failures = names, tuple(failures)
         values = [[None if e is None else c.read(e) for c in _COLUMNS] for e in evaluations]
         kept = [k for k in range(len(_COLUMNS)) if any(row[k] is not None for row in values)]
         self._columns = [_COLUMNS[k] for k in kept]

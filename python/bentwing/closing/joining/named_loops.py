@@ -29,6 +29,9 @@ if TYPE_CHECKING:
 _BY_EYE = (0.1, np.radians(2.0))
 # What is seen may correct such a transform by so much, m and rad.
 _CORRECTED = (1.0, np.radians(10.0))
+# Rooms built alike are told apart by the little that stands elsewhere in them; whoever names two times knows
+# which room it was, and that something may have been moved in between.
+_SAID_SAME = MatchSettings(max_conflict=MatchSettings().max_leafy_conflict)
 # Beyond this, m, the finished trajectory does not keep to a loop.
 _KEPT = 0.3
 _SAID_APART = "named as not the same place"
@@ -136,7 +139,7 @@ def _judged(
     if T_given is None:
         # where the estimate has them, and with both times at one point
         here = rigid(np.eye(3), T_1[:3, 3] - T_2[:3, 3])
-        candidate = match_pair(place_a, place_b, [np.eye(4), here])
+        candidate = match_pair(place_a, place_b, [np.eye(4), here], settings=_SAID_SAME)
         said = candidate.reason or "agrees with what is seen"
     else:
         candidate, said = _as_given(T_1 @ T_given @ inverse(T_2), place_a, place_b)
@@ -151,7 +154,7 @@ def _judged(
 def _as_given(T: Matrix, a: Place, b: Place) -> tuple[Candidate, str]:
     """Check a given transform by what is seen; where that is too little it is taken as it is."""
     agreement = verified(a, b, T)
-    seen = match_pair(a, b, [T], keypoints=False)
+    seen = match_pair(a, b, [T], keypoints=False, settings=_SAID_SAME)
     if seen.accepted and seen.alignment is not None and _is_near(seen.alignment.T_a_b, T, b):
         return seen, "agrees with what is seen, which has made it more exact"
     shift, turn = _BY_EYE

@@ -22,13 +22,13 @@ import yaml
 from benches.support import tables
 from bentwing import map_recording
 from bentwing.base.geodesy import LevelFrame, ProjectedSystem
+from bentwing.base.gps_time import adjusted_gps_origin
 from bentwing.base.progress import Progress
 from bentwing.base.run_record import read_record
 from bentwing.base.trajectory import read_tum
 from bentwing.closing.georeference.settings import GeoreferenceSettings
 from bentwing.evaluate import simulated
 from bentwing.evaluate.alignment import align
-from bentwing.map.gps_time import adjusted_gps_origin
 from bentwing.map.project import project
 from bentwing.map.read_mesh import read_mesh
 from bentwing.recording import Payload, Recording

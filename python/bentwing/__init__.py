@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     from bentwing.recording.payload import Payload
     from bentwing.recording.recording import Recording
     from bentwing.run.export.export import Exported, export, export_points
+    from bentwing.run.export.points import ExportOptions
     from bentwing.run.merging.runs import Merged, merge
     from bentwing.run.pipeline import map_recording
     from bentwing.run.run import Run
@@ -83,6 +84,7 @@ else:
             "recording.payload": ["Payload"],
             "recording.recording": ["Recording"],
             "run.export.export": ["Exported", "export", "export_points"],
+            "run.export.points": ["ExportOptions"],
             "run.merging.runs": ["Merged", "merge"],
             "run.pipeline": ["map_recording"],
             "run.run": ["Run"],
@@ -118,6 +120,7 @@ __all__ = [
     "DivergedError",
     "Estimate",
     "EstimationError",
+    "ExportOptions",
     "Exported",
     "FixedMount",
     "InertialUnit",

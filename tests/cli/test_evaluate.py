@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import subprocess
 import sys
@@ -110,6 +111,69 @@ def test_numbers_are_those_of_evo_on_the_same_files(bentwing, run_folder, tmp_pa
     assert found["relative"][0]["translation"]["rmse"] == pytest.approx(
         rpe.get_all_statistics()["rmse"], rel=1e-6
     )
+
+
+def test_errors_without_alignment_stand_beside_the_aligned_ones(bentwing, run_folder, tmp_path):
+    """The estimate moved by (1, 2, 0.5) m: aligned it is as good as before, as it stands it is off."""
+    poses, start = Trajectory.read_tum(run_folder / "trajectory.txt")
+    moved = Trajectory(poses.times, poses.positions + np.array([1.0, 2.0, 0.5]), poses.quats_xyzw)
+    moved.write_tum(tmp_path / "moved.txt", start)
+    truth = ("--reference-trajectory", run_folder / "trajectory.txt")
+    done = bentwing("evaluate", tmp_path / "moved.txt", *truth, "-o", tmp_path / "out")
+    assert done.code == 0, done.err
+    found = record_of(tmp_path / "out")["trajectory"]
+    assert found["absolute"]["rmse"] < 1e-4
+    assert found["unaligned"]["position"]["rmse"] == pytest.approx(5.25**0.5, abs=1e-4)
+    assert found["unaligned"]["axes"]["y"]["mean"] == pytest.approx(2.0, abs=1e-4)
+    assert "without alignment" in done.out
+    page = (tmp_path / "out" / "evaluation.html").read_text()
+    assert "2.29 m" in page
+    assert page.count("<figure") == len(list((tmp_path / "out").glob("*.svg")))
+
+
+def test_several_runs_make_a_table(bentwing, run_folder, tmp_path):
+    """A row each, in the terminal and as CSV, JSON and HTML; what one cannot answer is empty."""
+    truth = run_folder.parent / "truth.txt"
+    lone = tmp_path / "lone.txt"
+    lone.write_bytes((run_folder / "trajectory.txt").read_bytes())
+    out = tmp_path / "out"
+    done = bentwing(
+        "evaluate", run_folder, lone, tmp_path / "gone", "--table",
+        "--reference-trajectory", truth, "-o", out,
+    )  # fmt: skip
+    assert done.code == 0, done.err
+    assert "gone" in done.err
+    rows = list(csv.DictReader((out / "table.csv").read_text().splitlines()))
+    assert [row["run"] for row in rows] == [run_folder.name, "lone.txt", "gone"]
+    one = record_of(out / run_folder.name)
+    assert float(rows[0]["ate_rmse_m"]) == one["trajectory"]["absolute"]["rmse"]
+    assert float(rows[0]["thickness_median_m"]) == one["thickness"]["median"]
+    assert rows[1]["ate_rmse_m"] == rows[0]["ate_rmse_m"]
+    assert rows[1]["thickness_median_m"] == rows[2]["ate_rmse_m"] == ""
+    listed = json.loads((out / "table.json").read_text())
+    assert listed[2]["ate_rmse_m"] is None
+    assert [set(row) for row in listed] == [set(rows[0])] * 3
+    assert "lone.txt" in (out / "table.html").read_text()
+    assert "thickness" in done.out
+    assert "\u2026" not in done.out  # no number is cut
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [([], "--table"), (["--table"], "-o OUT"), (["--table", "-o", "x"], "name of several")],
+)
+def test_several_runs_need_a_table_a_folder_and_names(bentwing, run_folder, tmp_path, monkeypatch, arguments, says):  # fmt: skip
+    monkeypatch.chdir(tmp_path)
+    other = tmp_path / "other" / run_folder.name
+    done = bentwing("evaluate", run_folder, other, *arguments)
+    assert done.code == 2
+    assert says in done.err
+
+
+def test_where_no_run_can_be_evaluated_it_fails(bentwing, tmp_path):
+    done = bentwing("evaluate", tmp_path / "a", tmp_path / "b", "--table", "-o", tmp_path / "out")
+    assert done.code == 2
+    assert "does not exist" in done.err
 
 
 def test_open_and_closed_loop_are_compared_without_any_reference(bentwing, run_folder):

@@ -8,7 +8,7 @@ import typer
 
 from bentwing.base.errors import UsageError
 from bentwing.cli import options
-from bentwing.cli.options import EARTH, INPUT, MAP, RESULT, option
+from bentwing.cli.options import EARTH, MAP, RESULT, option
 from bentwing.map.formats import MapFormat
 from bentwing.run.export.names import TrajectoryFormat
 
@@ -29,24 +29,13 @@ EXAMPLES = (
 
 
 def command(
-    run: Annotated[
-        Path,
-        typer.Argument(
-            metavar="RUN",
-            help="Folder that `bentwing map`, `merge` or `localize` has written.",
-            rich_help_panel=INPUT,
-        ),
-    ],
+    run: options.Run,
     *,
     out: Annotated[
         Path,
-        option(
-            RESULT,
-            "--out",
-            "-o",
-            metavar="FILE",
-            help="Write this; its suffix says the format of a map (.copc.laz .laz .las .ply .pcd .e57) "
-            "or a trajectory (.txt .kitti .csv .kml .geojson); .mcap has both, for Foxglove and RViz.",
+        options.out_file(
+            "Write this; its suffix says the format of a map (.copc.laz .laz .las .ply .pcd .e57) "
+            "or a trajectory (.txt .kitti .csv .kml .geojson); .mcap has both, for Foxglove and RViz."
         ),
     ],
     map_format: Annotated[
@@ -151,10 +140,9 @@ def command(
     # slow to import, so only when it is needed
     from bentwing.base.progress import create_progress
     from bentwing.run.export.export import export
+    from bentwing.run.export.points import ExportOptions
 
-    written = export(
-        run,
-        out,
+    options = ExportOptions(
         spacing=spacing,
         crop=_crop(box, heights, times, within),
         polygon=polygon,
@@ -163,6 +151,11 @@ def command(
         refine=refine,
         epsg=epsg,
         local=local,
+    )
+    written = export(
+        run,
+        out,
+        options,
         tiles=tiles,
         map_format=map_format,
         trajectory_format=trajectory_format,

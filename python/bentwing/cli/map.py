@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from bentwing.base.new_file import require_new
 from bentwing.cli import options
 from bentwing.cli.command import PRINT_SETTINGS
 
@@ -32,6 +33,8 @@ def command(
     no_refine: options.NoRefine = False,
     georeference: options.Georeference = None,
     epsg: options.Epsg = None,
+    gnss: options.Gnss = None,
+    gnss_time: options.GnssTime = None,
     control_points: options.ControlPoints = None,
     no_loop_closure: Annotated[
         bool,
@@ -39,6 +42,7 @@ def command(
             options.ESTIMATION, "--no-loop-closure", help="Leave the trajectory open-loop."
         ),
     ] = False,
+    loops: options.Loops = None,
     no_map: Annotated[
         bool,
         options.option(
@@ -72,6 +76,7 @@ def command(
     from bentwing.base.errors import UsageError
     from bentwing.base.progress import create_progress
     from bentwing.cli.done import say_maps, say_run
+    from bentwing.closing.loop_file import read_loops
     from bentwing.recording.flights import flights_of
     from bentwing.recording.sections.project import Project
     from bentwing.run.choose import choose, given
@@ -83,8 +88,15 @@ def command(
         map_spacing=map_spacing,
         cleaning=options.cleaning(keep_mixed=keep_mixed, keep_moving=keep_moving),
         refine=False if no_refine else None,
-        georeferencing=given(mode=georeference, epsg=epsg, control_points=control_points),
+        georeferencing=given(
+            mode=georeference,
+            epsg=epsg,
+            fixes=gnss,
+            fixes_time=gnss_time,
+            control_points=control_points,
+        ),
         loop_closure=False if no_loop_closure else None,
+        loops=None if loops is None else read_loops(loops),
         writes_map=False if no_map else None,
         project=None if project is None else Project.load(project),
         threads=threads,
@@ -97,7 +109,8 @@ def command(
     if print_settings:
         typer.echo(chosen.to_yaml(), nl=False)
         return
-    options.require_new_file(write_payload)
+    if write_payload is not None:
+        require_new(write_payload)
     progress = create_progress(quiet=quiet)
     flights = flights_of(recording) if len(recording) > 1 else [recording]
     if len(flights) > 1:

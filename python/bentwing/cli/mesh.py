@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from bentwing.cli import options
-from bentwing.cli.options import INPUT, RESULT, option
+from bentwing.cli.options import RESULT, option
 from bentwing.products.names import MeshColour
 
 EXAMPLES = (
@@ -17,18 +17,11 @@ EXAMPLES = (
 
 
 def command(
-    run: Annotated[
-        Path,
-        typer.Argument(
-            metavar="RUN",
-            help="Folder of a finished run or merged map.",
-            rich_help_panel=INPUT,
-        ),
-    ],
+    run: options.Run,
     *,
     out: Annotated[
         Path,
-        option(RESULT, "--out", "-o", metavar="FILE", help="Triangles as .ply, .obj or .glb."),
+        options.out_file("Triangles as .ply, .obj or .glb."),
     ],
     spacing: Annotated[
         float,

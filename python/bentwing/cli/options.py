@@ -8,11 +8,11 @@ from typing import Annotated, Any
 
 import typer
 
-from bentwing.base.errors import UsageError
 from bentwing.base.threads import MOST_THREADS
 from bentwing.closing.georeference.names import GeoreferenceMode
 from bentwing.map.formats import MapFormat
 from bentwing.odometry.names import EstimatorName
+from bentwing.recording.gnss_files.names import TimeScale
 
 # The groups of a help page, in its order.
 INPUT = "Input"
@@ -47,21 +47,9 @@ def payload(**details: Any) -> Any:  # noqa: ANN401 - typer's own
     return option(INPUT, "--payload", "-p", metavar="FILE", help=help_line, **details)
 
 
-def require_new_file(path: Path | None) -> None:
-    """Refuse a file to write that is there already, or that has no folder to be in.
-
-    Raises
-    ------
-    UsageError
-    """
-    if path is None:
-        return
-    if path.exists():
-        msg = f"{path}: exists already; name another file, or move this one away"
-        raise UsageError(msg)
-    if not path.parent.is_dir():
-        msg = f"{path}: there is no folder {path.parent}; make it, or name a file elsewhere"
-        raise UsageError(msg)
+def out_file(help_line: str) -> Any:  # noqa: ANN401 - typer's own
+    """Return the option that names the file to write, which must not exist."""
+    return option(RESULT, "--out", "-o", metavar="FILE", help=help_line)
 
 
 def cleaning(*, keep_mixed: bool, keep_moving: bool) -> dict[str, bool]:
@@ -85,6 +73,15 @@ Start = Annotated[
 ]
 Duration = Annotated[
     float | None, option(INPUT, metavar="SECONDS", min=0, help="Length of the part to use.")
+]
+
+Run = Annotated[
+    Path,
+    typer.Argument(
+        metavar="RUN",
+        help="Folder that `bentwing map`, `merge` or `localize` has written.",
+        rich_help_panel=INPUT,
+    ),
 ]
 
 Out = Annotated[Path, out()]
@@ -170,6 +167,25 @@ Epsg = Annotated[
         help="Projected system of the map.",
     ),
 ]
+Gnss = Annotated[
+    Path | None,
+    option(
+        EARTH,
+        "--gnss",
+        metavar="FILE",
+        show_default="topic in payload.yaml",
+        help="GNSS fixes from a file: solution of RTKLIB (.pos), or NMEA 0183 with GGA.",
+    ),
+]
+GnssTime = Annotated[
+    TimeScale | None,
+    option(
+        EARTH,
+        "--gnss-time",
+        show_default="what the file says",
+        help="Time scale of that file; GPS is ahead of UTC by the leap seconds.",
+    ),
+]
 ControlPoints = Annotated[
     Path | None,
     option(
@@ -207,6 +223,15 @@ TrustPayload = Annotated[
 Force = Annotated[
     bool,
     option(INPUT, "--force", help="Map a recording that `bentwing info` calls unfit."),
+]
+
+Loops = Annotated[
+    Path | None,
+    option(
+        ESTIMATION,
+        metavar="FILE",
+        help="YAML of pairs of times at which the same place was seen, or was not.",
+    ),
 ]
 
 Threads = Annotated[

@@ -39,11 +39,11 @@ def command(
 ) -> None:
     """Write a payload.yaml to start from: topics, lidar, IMU and encoder of a recording."""
     # slow to import, so only when it is needed
+    from bentwing.base.new_file import require_new
     from bentwing.calibrate.draft import draft_payload
-    from bentwing.cli.options import require_new_file
 
     del action  # there is one
-    require_new_file(out)
+    require_new(out)
     draft = draft_payload(recording)
     draft.save(out)
     if not quiet:

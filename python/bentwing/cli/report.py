@@ -1,13 +1,12 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
 """`bentwing report`: the report of a finished run again, and on paper."""
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from bentwing.cli import options
-from bentwing.cli.options import INPUT, RESULT, option
+from bentwing.cli.options import RESULT, option
 
 EXAMPLES = (
     "bentwing report run --pdf",
@@ -16,14 +15,7 @@ EXAMPLES = (
 
 
 def command(
-    run: Annotated[
-        Path,
-        typer.Argument(
-            metavar="RUN",
-            help="Folder that `bentwing map`, `merge` or `localize` has written.",
-            rich_help_panel=INPUT,
-        ),
-    ],
+    run: options.Run,
     *,
     project: options.Project = None,
     pdf: Annotated[

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from bentwing.cli import options
-from bentwing.cli.options import INPUT, RESULT, option
+from bentwing.cli.options import RESULT, option
 
 if TYPE_CHECKING:
     from bentwing.products.plane import CutPlane
@@ -23,14 +23,7 @@ CUT = "Cut"
 
 
 def command(
-    run: Annotated[
-        Path,
-        typer.Argument(
-            metavar="RUN",
-            help="Folder of a finished run or merged map.",
-            rich_help_panel=INPUT,
-        ),
-    ],
+    run: options.Run,
     *,
     plan: Annotated[
         float | None,
@@ -59,12 +52,8 @@ def command(
     ] = 0.1,
     out: Annotated[
         Path,
-        option(
-            RESULT,
-            "--out",
-            "-o",
-            metavar="FILE",
-            help="Drawing as .dxf, .svg, .png or .pdf, or occupancy grid for Nav2 as .yaml.",
+        options.out_file(
+            "Drawing as .dxf, .svg, .png or .pdf, or occupancy grid for Nav2 as .yaml."
         ),
     ],
     scale: Annotated[

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from bentwing.cli import options
-from bentwing.cli.options import INPUT, RESULT, option
+from bentwing.cli.options import RESULT, option
 
 EXAMPLES = (
     "bentwing terrain run -o dtm.tif",
@@ -17,24 +17,13 @@ EXAMPLES = (
 
 
 def command(
-    run: Annotated[
-        Path,
-        typer.Argument(
-            metavar="RUN",
-            help="Folder of a finished run or merged map.",
-            rich_help_panel=INPUT,
-        ),
-    ],
+    run: options.Run,
     *,
     out: Annotated[
         Path,
-        option(
-            RESULT,
-            "--out",
-            "-o",
-            metavar="FILE",
-            help="Heights as .tif; contours as .geojson, .dxf, .svg, .png or .pdf; the map with "
-            "classes and heights above ground as .laz or .las.",
+        options.out_file(
+            "Heights as .tif; contours as .geojson, .dxf, .svg, .png or .pdf; the map with "
+            "classes and heights above ground as .laz or .las."
         ),
     ],
     cell: Annotated[

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from bentwing.cli import options
-from bentwing.cli.options import INPUT, RESULT, option
+from bentwing.cli.options import RESULT, option
 
 EXAMPLES = (
     "bentwing view run",
@@ -18,14 +18,7 @@ EXAMPLES = (
 
 
 def command(
-    run: Annotated[
-        Path,
-        typer.Argument(
-            metavar="RUN",
-            help="Folder that `bentwing map` has written.",
-            rich_help_panel=INPUT,
-        ),
-    ],
+    run: options.Run,
     *,
     save: Annotated[
         Path | None, option(RESULT, metavar="FILE", help="Write a .rrd file instead.")

@@ -17,14 +17,7 @@ EXAMPLES = (
 
 
 def command(
-    run: Annotated[
-        Path,
-        typer.Argument(
-            metavar="RUN",
-            help="Folder of a finished run or merged map.",
-            rich_help_panel=INPUT,
-        ),
-    ],
+    run: options.Run,
     *,
     area: Annotated[
         Path,

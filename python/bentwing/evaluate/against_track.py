@@ -32,6 +32,8 @@ from bentwing.evaluate.tracked_point import TrackedPoint, find_tracked_point, mo
 from bentwing.evaluate.trajectory import angles
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from bentwing.evaluate.track import Track
@@ -59,6 +61,25 @@ class RotationError:
 
 
 @dataclass(frozen=True, slots=True)
+class Unaligned:
+    """Errors as the coordinates stand, for estimates that claim to be in the frame of the reference.
+
+    Attributes
+    ----------
+    position : of the distances, m
+    axes : x, y, z of the reference's frame, m
+    """
+
+    position: Statistics
+    axes: dict[str, Box]
+
+    @classmethod
+    def of(cls, errors: NDArray[np.float64]) -> Unaligned:
+        """Summarize errors (N, 3) m."""
+        return cls(Statistics.of(np.linalg.norm(errors, axis=1)), _boxes(errors))
+
+
+@dataclass(frozen=True, slots=True)
 class TrackError:
     """Differences between a trajectory and a reference, estimate minus reference.
 
@@ -67,6 +88,7 @@ class TrackError:
     tracked_point : clock offset and lever arm
     absolute : of the distances after alignment, m; the absolute trajectory error
     axes : x, y, z of the reference's frame, m
+    unaligned : the same without alignment
     error_over_speed : robust line of the distance, m, over the speed, m/s
     relative : over pieces of the way of `DELTAS`
     rotation : None where the reference has no orientations
@@ -81,6 +103,7 @@ class TrackError:
     tracked_point: TrackedPoint
     absolute: Statistics
     axes: dict[str, Box]
+    unaligned: Unaligned
     error_over_speed: Line | None
     relative: list[RelativeError]
     rotation: RotationError | None
@@ -102,6 +125,7 @@ def compare_with_track(
     *,
     clock_offset: float | None = None,
     lever_arm: tuple[float, float, float] | None = None,
+    written: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None,
 ) -> TrackError:
     """Compare a trajectory with a reference in a frame of its own.
 
@@ -116,6 +140,7 @@ def compare_with_track(
     clock_offset : s, how far the reference's clock is ahead; None: estimated
     lever_arm : m, tracked point in the IMU frame; None: estimated where the reference has
         positions only, else zero
+    written : takes positions (N, 3) m of the estimate to the coordinates that its map is written in
 
     References
     ----------
@@ -137,13 +162,15 @@ def compare_with_track(
         else align_poses(matched, reference)
     )
     errors = alignment.apply(matched).positions - positions
+    as_is = matched.positions if written is None else written(matched.positions)
     distances = np.linalg.norm(errors, axis=1)
     speeds = _speeds(estimate, matched.times)
     relative = [relative_pose_error(matched, positions, quats, delta) for delta in DELTAS]
     return TrackError(
         tracked_point=point,
         absolute=Statistics.of(distances),
-        axes={name: Box.of(errors[:, i]) for i, name in enumerate("xyz")},
+        axes=_boxes(errors),
+        unaligned=Unaligned.of(as_is - positions),
         error_over_speed=fit_line(speeds, distances) if _varies(speeds) else None,
         relative=[found for found in relative if found is not None],
         rotation=None if reference is None else _rotation(alignment.apply(matched), reference),
@@ -156,6 +183,10 @@ def compare_with_track(
         speeds=speeds,
         reference=reference,
     )
+
+
+def _boxes(errors: NDArray[np.float64]) -> dict[str, Box]:
+    return {name: Box.of(errors[:, i]) for i, name in enumerate("xyz")}
 
 
 def _at_common_times(

@@ -11,6 +11,7 @@ import numpy as np
 from bentwing.base.errors import UsageError
 from bentwing.base.progress import Progress, as_progress
 from bentwing.base.trajectory import Trajectory, read_tum
+from bentwing.closing.localize.coordinates import coordinates_of_run
 from bentwing.evaluate.against_surface import (
     THRESHOLD,
     MapError,
@@ -52,6 +53,11 @@ class Question:
     clock_offset: float | None = None
     lever_arm: tuple[float, float, float] | None = None
     threshold: float = THRESHOLD
+
+    def files(self) -> list[Path]:
+        """Return the references that are given."""
+        listed = (self.reference_trajectory, self.reference_map)
+        return [path for path in listed if path is not None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +103,11 @@ def evaluate(
         If a file cannot be used, or a reference does not fit.
     """
     question, progress = question or Question(), as_progress(progress)
-    _require_counterparts(subject, question)
+    if question.reference_trajectory is not None:
+        subject = subject.flown_with(question.reference_trajectory)
+    if question.reference_map is not None and subject.map_path is None:
+        msg = "there is no map to compare with --reference-map"
+        raise UsageError(msg)
     result = Evaluation()
     path = _trajectory(subject, question, progress, result)
     if subject.map_path is None:
@@ -118,15 +128,6 @@ def evaluate(
     return result
 
 
-def _require_counterparts(subject: Subject, question: Question) -> None:
-    if question.reference_trajectory is not None and subject.trajectory is None:
-        msg = "there is no trajectory to compare with --reference-trajectory"
-        raise UsageError(msg)
-    if question.reference_map is not None and subject.map_path is None:
-        msg = "there is no map to compare with --reference-map"
-        raise UsageError(msg)
-
-
 def _trajectory(
     subject: Subject, question: Question, progress: Progress, result: Evaluation
 ) -> Trajectory | None:
@@ -137,6 +138,7 @@ def _trajectory(
     odometry = None if subject.odometry is None else read_tum(subject.odometry, origin_ns)[0]
     if question.reference_trajectory is not None:
         with progress.stage("comparing the trajectory with the reference"):
+            placed = coordinates_of_run(subject.georeference)
             reference = read_track(question.reference_trajectory)
             if reference.n_repeats:
                 result.notes.append(
@@ -148,6 +150,7 @@ def _trajectory(
                 reference,
                 clock_offset=question.clock_offset,
                 lever_arm=question.lever_arm,
+                written=None if placed is None else placed.to_projected,
             )
             if result.trajectory.is_straight:
                 result.notes.append(

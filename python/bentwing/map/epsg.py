@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""In which coordinate system a map says that it is."""
+"""In which coordinate system a map says that it is, and how other files name it."""
 
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import laspy
 
@@ -17,6 +17,15 @@ _CODE = re.compile(r'(?:ID|AUTHORITY)\[\s*"EPSG"\s*,\s*"?(\d+)"?\s*\]')
 _WKT = 2112  # record id of a coordinate system in well-known text
 _GEO_KEYS = 34735
 _PROJECTED = 3072
+
+
+def geojson_system(epsg: int | None) -> dict[str, Any]:
+    """Return the member of GeoJSON that names a system, which GDAL and QGIS go by; none without one.
+
+    RFC 7946 has degrees only, and others by agreement.
+    """
+    name = f"urn:ogc:def:crs:EPSG::{epsg}"
+    return {} if epsg is None else {"crs": {"type": "name", "properties": {"name": name}}}
 
 
 def epsg_of_map(path: Path) -> int | None:

@@ -10,8 +10,8 @@ import laspy
 import numpy as np
 
 from bentwing.base.errors import InputError
+from bentwing.base.gps_time import adjusted_gps_origin
 from bentwing.map.chunk import MapChunk
-from bentwing.map.gps_time import adjusted_gps_origin
 from bentwing.map.las_bounds import require_sound_las
 from bentwing.map.write_las import EXTRA
 

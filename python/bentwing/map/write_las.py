@@ -10,8 +10,8 @@ import numpy as np
 from laspy.vlrs.known import WktCoordinateSystemVlr
 
 from bentwing import _core
+from bentwing.base.gps_time import adjusted_gps_origin
 from bentwing.map.compress_laz import LazBackend
-from bentwing.map.gps_time import adjusted_gps_origin
 from bentwing.map.writer import MapWriter, round_offset
 
 if TYPE_CHECKING:

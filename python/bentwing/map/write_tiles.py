@@ -17,6 +17,7 @@ from bentwing.base.plain import plain
 from bentwing.base.staged_folder import staged_folder
 from bentwing.base.voxels import cells_of
 from bentwing.map.chunk import MapChunk
+from bentwing.map.epsg import geojson_system
 from bentwing.map.writer import open_map
 
 if TYPE_CHECKING:
@@ -128,7 +129,5 @@ def _feature(
 def _index(
     name: str, system: ProjectedSystem | None, features: list[dict[str, Any]]
 ) -> dict[str, Any]:
-    """Return the index; the member `crs` is what GDAL and QGIS go by where coordinates are no degrees."""
-    named = f"urn:ogc:def:crs:EPSG::{system.epsg}" if system is not None else None
-    crs = {"crs": {"type": "name", "properties": {"name": named}}} if named else {}
+    crs = geojson_system(None if system is None else system.epsg)
     return {"type": "FeatureCollection", "name": name, **crs, "features": features}

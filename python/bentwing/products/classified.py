@@ -10,7 +10,7 @@ import laspy
 import numpy as np
 
 from bentwing.base.atomic import atomic_path
-from bentwing.map.gps_time import adjusted_gps_origin
+from bentwing.base.gps_time import adjusted_gps_origin
 from bentwing.map.las_bounds import require_sound_las
 from bentwing.map.read_rows import PART
 from bentwing.map.write_las import SCALE
@@ -73,7 +73,7 @@ def _other_parts(source: FinishedMap) -> Iterator[laspy.LasHeader | laspy.ScaleA
     header.global_encoding.gps_time_type = laspy.header.GpsTimeType.STANDARD
     header.add_extra_dim(_HEIGHT)
     yield header
-    begin = adjusted_gps_origin(source.start_ns)
+    begin = adjusted_gps_origin(source.run.start_ns)
     for part in source.parts():
         record = laspy.ScaleAwarePointRecord.zeros(len(part.points), header=header)
         record.x, record.y, record.z = (part.points + source.origin).T

@@ -11,6 +11,7 @@ import numpy as np
 
 from bentwing.base.atomic import write_text
 from bentwing.base.errors import InputError, UsageError
+from bentwing.map.epsg import geojson_system
 from bentwing.products.section_drawing import write_sheet
 from bentwing.products.sheet import Stroke, add_grid, lay_out
 from bentwing.products.title import Entry, add_title, made_of, place_of
@@ -126,7 +127,7 @@ def write_contours(
 
 
 def _geojson(contours: Sequence[Contour], epsg: int | None) -> dict[str, Any]:
-    """Return contours as GeoJSON in the coordinates of the map, which RFC 7946 allows by agreement."""
+    """Return contours as GeoJSON in the coordinates of the map."""
     features = [
         {
             "type": "Feature",
@@ -135,7 +136,4 @@ def _geojson(contours: Sequence[Contour], epsg: int | None) -> dict[str, Any]:
         }
         for contour in contours
     ]
-    system = {} if epsg is None else {
-        "crs": {"type": "name", "properties": {"name": f"urn:ogc:def:crs:EPSG::{epsg}"}}
-    }  # fmt: skip
-    return {"type": "FeatureCollection", **system, "features": features}
+    return {"type": "FeatureCollection", **geojson_system(epsg), "features": features}

@@ -4,24 +4,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bentwing.base.errors import InputError, UsageError
-from bentwing.base.regular_file import resolved
-from bentwing.base.run_record import RECORD, finished_record, understood
-from bentwing.base.trajectory import Trajectory, read_tum
+from bentwing.base.clock import NS_PER_S
+from bentwing.base.errors import InputError
+from bentwing.base.run_record import understood
 from bentwing.map.epsg import epsg_of_map
-from bentwing.map.formats import MAP_SUFFIXES
-from bentwing.map.gps_time import adjusted_gps_origin
-from bentwing.map.read import MapPart, read_parts
+from bentwing.map.finished_run import FinishedRun
+from bentwing.map.read import MapPart
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator
+    from pathlib import Path
 
     from numpy.typing import NDArray
+
+    from bentwing.base.trajectory import Trajectory
 
 _ROUND = 100.0  # m, of the place that coordinates are relative to
 _STAMPS = 1e-6  # s; those of files are rounded
@@ -35,29 +35,23 @@ class FinishedMap:
 
     Attributes
     ----------
-    folder : of the run
+    run : as its folder holds it
     path : file of the map
-    record : run.json
     origin : (3,) m, of the coordinates used here in those of the file; its height is zero
     epsg : of the file's coordinates; None where they are the run's own
-    start_ns : time zero, ns UTC
     ways : of the sensors, one for each run, in the coordinates used here; empty where there is none
     """
 
-    folder: Path
+    run: FinishedRun
     path: Path
-    record: Mapping[str, Any]
     origin: NDArray[np.float64]
     epsg: int | None
-    start_ns: int
     ways: tuple[Trajectory, ...]
 
     def parts(self) -> Iterator[MapPart]:
         """Read points, and times in s since the recording's start where the file has any."""
-        begin = adjusted_gps_origin(self.start_ns) if self.path.suffix in {".laz", ".las"} else 0.0
-        for part in read_parts(self.path):
-            times = None if part.times is None else part.times - begin
-            yield MapPart(part.points - self.origin, times)
+        for part in self.run.parts():
+            yield MapPart(part.points - self.origin, part.times)
 
     def sensors_at(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return where the sensor was (N, 3) m; NaN where no way says so, or two of them do."""
@@ -71,69 +65,38 @@ class FinishedMap:
         found[n_ways != 1] = np.nan
         return found
 
-    def require_output(self, out: Path, suffixes: tuple[str, ...]) -> None:
-        """Refuse a file that cannot be written, is a result of the run, or of another kind.
 
-        Raises
-        ------
-        UsageError
-        """
-        if out.suffix.lower() not in suffixes:
-            msg = f"{out}: its name must end with {' or '.join(suffixes)}"
-            raise UsageError(msg)
-        if not out.parent.is_dir():
-            msg = f"{out}: there is no folder {out.parent}; make it, or name a file elsewhere"
-            raise UsageError(msg)
-        results = {resolved(self.folder / name) for name in (*self.record["files"], RECORD)}
-        if resolved(out) in results:
-            msg = f"{out}: is a result of the run; name another file"
-            raise UsageError(msg)
-
-
-def open_map_of(run: Path | str) -> FinishedMap:
+def open_map_of(folder: Path | str) -> FinishedMap:
     """Open the map of a run folder.
 
     Raises
     ------
     UsageError
-        If the folder holds no run, or one that is not complete.
+        If the folder holds no run, one that is not complete, or several separate maps.
     InputError
         If it has no map, an empty one, or a file is not the one that the run wrote.
     """
-    folder = Path(run)
-    record = finished_record(folder)
-    path = next((p for s in MAP_SUFFIXES if (p := folder / f"map{s}").is_file()), None)
-    if path is None:
-        msg = f"{folder}: the run has no map; run `bentwing map` again, to its end and without --no-map"
-        raise InputError(msg)
-    first = next((part.points for part in read_parts(path) if len(part.points)), None)
+    run = FinishedRun.open(folder)
+    path = run.require_map()
+    first = next((part.points for part in run.parts() if len(part.points)), None)
     if first is None:
         msg = f"{path}: holds no point; give a run with a map"
         raise InputError(msg)
     origin = np.round(np.median(first, axis=0) / _ROUND) * _ROUND * [1.0, 1.0, 0.0]
-    with understood(folder):
-        start_ns = _start_of(record)
-        ways = _ways_of(folder, record, start_ns, origin)
-    return FinishedMap(folder, path, record, origin, epsg_of_map(path), start_ns, ways)
+    with understood(run.folder):
+        return FinishedMap(run, path, origin, epsg_of_map(path), _ways_of(run, origin))
 
 
-def _start_of(record: Mapping[str, Any]) -> int:
-    starts = [int(run["start_ns"]) for run in record.get("runs") or [record]]
-    return min(starts)
-
-
-def _ways_of(
-    folder: Path, record: Mapping[str, Any], start_ns: int, origin: NDArray[np.float64]
-) -> tuple[Trajectory, ...]:
-    """Return the trajectories in the coordinates of the map, less the origin."""
-    names = [run["trajectory"] for run in record.get("runs") or [{"trajectory": "trajectory.txt"}]]
-    found = [read_tum(path, start_ns)[0] for name in names if (path := folder / name).is_file()]
-    linear = (record.get("georeference") or {}).get("linear")
+def _ways_of(run: FinishedRun, origin: NDArray[np.float64]) -> tuple[Trajectory, ...]:
+    """Return the trajectories in the coordinates of the map, less the origin, on its clock."""
+    linear = (run.record.get("georeference") or {}).get("linear")
     moved = []
-    for way in found:
+    for flight in run.flights:
+        way, late = flight.trajectory, (flight.start_ns - run.start_ns) / NS_PER_S
         positions = way.positions
         if linear:
             local = positions - np.array(linear["map"])
             positions = local @ np.array(linear["matrix"]).T + np.array(linear["projected"])
-        moved.append(replace(way, positions=positions - origin))
+        if len(way):
+            moved.append(replace(way, times=way.times + late, positions=positions - origin))
     return tuple(moved)

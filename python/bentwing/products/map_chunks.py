@@ -26,7 +26,7 @@ def chunks_of(source: FinishedMap) -> Iterator[MapChunk]:
         If the file is damaged, which may show at its end only.
     """
     if source.path.suffix in CHUNK_SUFFIXES:
-        for chunk in MapFile.open(source.path).chunks(source.start_ns):
+        for chunk in MapFile.open(source.path).chunks(source.run.start_ns):
             yield replace(chunk, points=chunk.points - source.origin)
         return
     for part in source.parts():

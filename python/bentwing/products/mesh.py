@@ -11,6 +11,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from bentwing.base.errors import InputError, UsageError
+from bentwing.base.new_file import require_new
 from bentwing.base.progress import Progress
 from bentwing.base.value import Value
 from bentwing.products.finished_map import open_map_of
@@ -127,7 +128,7 @@ def write_mesh(
         As `mesh_of`; also where the file cannot be written.
     """
     source, path, progress = open_map_of(run), Path(out), progress or Progress()
-    source.require_output(path, MESH_SUFFIXES)
+    require_new(path, MESH_SUFFIXES)
     local = _fit(source, spacing, colour, progress)
     with progress.stage("writing"):
         write_triangles(path, local.vertices, local.triangles, local.colours, source.origin)

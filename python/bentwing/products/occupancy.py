@@ -12,6 +12,7 @@ from scipy.ndimage import uniform_filter
 
 from bentwing.base.atomic import write_bytes, write_text
 from bentwing.base.errors import UsageError
+from bentwing.base.new_file import require_new
 from bentwing.base.progress import Progress
 from bentwing.base.value import Value
 from bentwing.products.beams import Passages
@@ -97,8 +98,8 @@ def write_occupancy(
         As `section_of`; also where the plane is not level or the grid would be too large.
     """
     source, path = open_map_of(run), Path(out)
-    source.require_output(path, (".yaml",))
-    source.require_output(path.with_suffix(".pgm"), (".pgm",))
+    require_new(path, (".yaml",))
+    require_new(path.with_suffix(".pgm"), (".pgm",))
     grid = _grid_of(source, plane, thickness, cell, progress or Progress())
     grey: NDArray[np.uint8] = np.zeros(grid.cells.shape, np.uint8)
     for value, shade in _GREY.items():

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bentwing.base.errors import UsageError
+from bentwing.base.new_file import require_new
 from bentwing.base.progress import Progress
 from bentwing.products.cutting import cut_section
 from bentwing.products.finished_map import open_map_of
@@ -67,7 +68,7 @@ def write_section(
         As `section_of`; also where the file cannot be written or the drawing is too large for A0.
     """
     source, path = open_map_of(run), Path(out)
-    source.require_output(path, DRAWINGS)
+    require_new(path, DRAWINGS)
     if path.suffix.lower() == ".dxf":
         require_ezdxf()
     if scale is not None and scale < 1:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bentwing.base.errors import InputError, UsageError
+from bentwing.base.new_file import require_new
 from bentwing.base.progress import Progress
 from bentwing.products.classified import write_classified
 from bentwing.products.contours import require_contourpy, write_contours
@@ -76,7 +77,7 @@ def write_terrain(
         As `terrain_of`; also where the file cannot be written.
     """
     source, path = open_map_of(run), Path(out)
-    source.require_output(path, (*_RASTER, *_CLOUDS, *_LINES))
+    require_new(path, (*_RASTER, *_CLOUDS, *_LINES))
     kind, progress = path.suffix.lower(), progress or Progress()
     if kind in _LINES:
         require_contourpy()

@@ -67,8 +67,8 @@ def place_of(source: FinishedMap) -> str:
 
 def made_of(source: FinishedMap) -> str:
     """Say of which run a drawing is, recorded when, and made by what."""
-    day = datetime.fromtimestamp(source.start_ns // NS_PER_S, timezone.utc).date()
-    name = source.folder.resolve().name
+    day = datetime.fromtimestamp(source.run.start_ns // NS_PER_S, timezone.utc).date()
+    name = source.run.folder.resolve().name
     return f"{name}, recorded {day}; bentwing {bentwing_version()}"
 
 

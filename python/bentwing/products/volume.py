@@ -114,7 +114,7 @@ def measure_volume(
         top = surface_of(source, cell)
     with progress.stage("finding the base"):
         below, records = _base(source, str(base), top, local, progress)
-    stated = [_stated(record) for record in (source.record, *records)]
+    stated = [_stated(record) for record in (source.run.record, *records)]
     sigma = float(np.sqrt(sum((s or 0.0) ** 2 for s in stated)))
     found = volume_between(top, below, local, sigma, is_stated=None not in stated)
     if found.measured == 0.0:
@@ -219,12 +219,12 @@ def _base(
     other = open_map_of(base)
     if other.epsg != source.epsg:
         names = [f"EPSG:{s.epsg}" if s.epsg else "a frame of its own" for s in (source, other)]
-        msg = f"{source.folder} is in {names[0]}, {other.folder} in {names[1]}; give two runs in the same coordinates"
+        msg = f"{source.run.folder} is in {names[0]}, {other.run.folder} in {names[1]}; give two runs in the same coordinates"
         raise UsageError(msg)
     surface = surface_of(other, top.cell)
     shift = (source.origin - other.origin)[:2]
     heights = surface.height_at(top.centres().reshape(-1, 2) + shift).reshape(top.heights.shape)
-    return Base(heights), [other.record]
+    return Base(heights), [other.run.record]
 
 
 def _stated(record: Mapping[str, Any]) -> float | None:

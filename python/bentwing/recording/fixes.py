@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""GNSS fixes of a recording: sensor_msgs/NavSatFix."""
+"""GNSS fixes of a recording: sensor_msgs/NavSatFix and gps_common/GPSFix."""
 
 from __future__ import annotations
 
 import struct
 from collections import Counter
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -19,6 +19,15 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bentwing.base.clock import Clock
+
+
+class Parse(Protocol):
+    """Reads a message: stamp in ns, status, place and covariance (12), covariance type."""
+
+    def __call__(self, raw: bytes, *, cdr: bool) -> tuple[int, int, tuple[float, ...], int]:
+        """Raise BrokenMessageError for bytes that are no such message."""
+        ...
+
 
 # What a receiver that does not know its accuracy is trusted with, m, east, north and up.
 UNKNOWN_SIGMAS = (3.0, 3.0, 6.0)
@@ -59,6 +68,7 @@ def read_fixes(
     clock: Clock,
     *,
     cdr: bool,
+    parse: Parse | None = None,
     begin: float = 0.0,
     end: float = float("inf"),
 ) -> Fixes:
@@ -69,14 +79,16 @@ def read_fixes(
     messages : topic, recorder's time in ns and bytes, in time order, of one topic
     clock : of the recording
     cdr : ROS 2's encoding instead of ROS 1's
+    parse : of the messages' type; default: `nav_sat_fix`
     """
+    parse = parse or nav_sat_fix
     counts: Counter[str] = Counter()
     parsed = []
     topic = ""
     for topic, recorder_ns, raw in messages:  # noqa: B007 - the name is for messages
         counts["messages"] += 1
         try:
-            parsed.append((recorder_ns, *nav_sat_fix(raw, cdr=cdr)))
+            parsed.append((recorder_ns, *parse(raw, cdr=cdr)))
         except (BrokenMessageError, IndexError):
             counts["broken_messages"] += 1
     no_stamps = all(stamp_ns == 0 for _, stamp_ns, *_ in parsed)
@@ -115,9 +127,16 @@ def _covariances(
     known &= (variances > 0).all(axis=1) & (variances < 1e8).all(axis=1)
     counts["unknown_covariance"] += int(np.count_nonzero(~known))
     usable = np.where(known[:, None, None], covariances, np.diag(np.square(UNKNOWN_SIGMAS)))
-    usable = 0.5 * (usable + usable.transpose(0, 2, 1))
-    # Off the diagonal some drivers write anything; too much of it would be no covariance.
-    values, vectors = np.linalg.eigh(usable)
+    return positive(usable)
+
+
+def positive(covariances: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return covariances (N, 3, 3) m² with standard deviations of `MIN_SIGMA` and more in all directions.
+
+    Off the diagonal some programs write anything; too much of it would be no covariance.
+    """
+    symmetric = 0.5 * (covariances + covariances.transpose(0, 2, 1))
+    values, vectors = np.linalg.eigh(symmetric)
     values = np.maximum(values, MIN_SIGMA**2)
     filled: NDArray[np.float64] = np.einsum("nij,nj,nkj->nik", vectors, values, vectors)
     return filled

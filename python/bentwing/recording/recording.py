@@ -17,6 +17,7 @@ from bentwing.recording.containers.source import open_source
 from bentwing.recording.fixes import Fixes, read_fixes
 from bentwing.recording.frames import placed
 from bentwing.recording.joints import peek_joints, unclear_joint
+from bentwing.recording.messages.gps_fix import GPS_FIX, gps_fix
 from bentwing.recording.open_streams import open_streams
 from bentwing.recording.packets.peek import peek_imu, peek_lidar
 from bentwing.recording.payload import as_payload
@@ -316,7 +317,7 @@ class Recording:
                 "clock, or expect the stamps' jitter"
             )
         gnss = self.payload.gnss
-        if gnss is not None and self._gnss_topic() is None:
+        if gnss is not None and gnss.topic is not None and self._gnss_topic() is None:
             sentences.append(
                 f"the payload names the gnss topic {gnss.topic}, which the recording does not have; "
                 "the map stays in its own frame"
@@ -378,20 +379,22 @@ class Recording:
         topic = self._gnss_topic()
         if topic is None:
             return None
-        if topic.type != NAV_SAT_FIX:
+        if topic.type not in {NAV_SAT_FIX, *GPS_FIX}:
             msg = (
                 f"topic {topic.name} has the type {topic.type or 'unknown'}, which cannot be read as "
-                f"gnss; supported is {NAV_SAT_FIX}"
+                f"gnss; supported are {', '.join((NAV_SAT_FIX, *sorted(GPS_FIX)))}"
             )
             raise RecordingError(msg)
         begin = 0.0 if start is None else start
         end = float("inf") if duration is None else begin + duration
         messages = self._source.messages({topic.name}, self._seek_ns(begin))
-        return read_fixes(messages, self.clock, cdr=self._source.cdr, begin=begin, end=end)
+        parse = gps_fix if topic.type in GPS_FIX else None
+        cdr = self._source.cdr
+        return read_fixes(messages, self.clock, cdr=cdr, parse=parse, begin=begin, end=end)
 
     def _gnss_topic(self) -> TopicInfo | None:
         gnss = self.payload.gnss
-        if gnss is None:
+        if gnss is None or gnss.topic is None:
             return None
         name = gnss.topic.strip("/")
         return next((topic for topic in self.topics if topic.name.strip("/") == name), None)

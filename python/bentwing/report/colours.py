@@ -31,10 +31,15 @@ def colour(values: NDArray[np.float64], table: tuple[str, ...]) -> NDArray[np.fl
     return _shades(table).take(np.rint(at).astype(np.intp), axis=0)
 
 
+def ints(code: str) -> list[int]:
+    """Return red, green and blue, 0 to 255, of a colour's code."""
+    return [int(code[i : i + 2], 16) for i in (0, 2, 4)]
+
+
 @lru_cache
 def _shades(table: tuple[str, ...]) -> NDArray[np.float32]:
     """Colours `(_SHADES, 3)` from one end of a table to the other."""
-    anchors = np.array([[int(code[i : i + 2], 16) for i in (0, 2, 4)] for code in table], float)
+    anchors = np.array([ints(code) for code in table], float)
     at, places = np.linspace(0, 1, _SHADES), np.linspace(0, 1, len(table))
     return np.stack([np.interp(at, places, c) for c in anchors.T], axis=1).astype(np.float32)
 

@@ -33,7 +33,7 @@ class Drawn:
     trajectory : of the IMU, shown coordinates
     points, times : (N, 3) m, shown coordinates, and (N,) s, of the map
     views, coverage : of the map; None without points
-    origin : (3,) m, to add to shown coordinates for those that are written
+    frame : from the map's frame to shown coordinates
     texts : words of the language
     """
 
@@ -43,7 +43,7 @@ class Drawn:
     times: NDArray[np.float64]
     views: MapViews | None
     coverage: Coverage | None
-    origin: NDArray[np.float64]
+    frame: ShownFrame
     texts: Texts
 
     @classmethod
@@ -60,10 +60,10 @@ class Drawn:
         frame = ShownFrame.of(georeference)
         points, way = frame.points(places), frame.trajectory(trajectory)
         if not len(points):
-            return cls(record, way, points, times, None, None, frame.origin, texts)
+            return cls(record, way, points, times, None, None, frame, texts)
         n_points = int((record.get("counts") or {}).get("map.points") or len(points))
         marks = marks_of(georeference, frame)
         windows = record.get("windows") or []
         views = draw_views(points, times, way, windows, frame=frame, marks=marks)
         coverage = draw_coverage(points, times, n_points)
-        return cls(record, way, points, times, views, coverage, frame.origin, texts)
+        return cls(record, way, points, times, views, coverage, frame, texts)

@@ -63,12 +63,20 @@ def closing_table(record: Mapping[str, Any] | None, *, asked: bool) -> str:
             ("largest correction", f"{1e3 * record['largest_translation']:.1f} mm, "
              f"{np.degrees(record['largest_rotation']):.3f}°"),
         ]  # fmt: skip
+    rows += [(_named(one), str(one["said"])) for one in record.get("named") or []]
     rows += [
         (f"iteration {i + 1}", f"{step['n_far_matches']:,} matches between visits, moved "
          f"{1e3 * step['translation']:.2f} mm")
         for i, step in enumerate(record.get("iterations") or [])
     ]  # fmt: skip
     return table(("closing the loops", ""), rows, numbers=frozenset({1}))
+
+
+def _named(loop: Mapping[str, Any]) -> str:
+    """Say which loop this is that a user has named."""
+    first, second = loop["times"]
+    what = "the same place" if loop["same"] else "not the same place"
+    return f"named as {what}: {first:g} s and {second:g} s"
 
 
 def revisits_table(revisits: Revisits | None, thickness: float | None) -> str:

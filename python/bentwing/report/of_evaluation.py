@@ -11,6 +11,7 @@ from bentwing.base.atomic import write_text
 from bentwing.evaluate.robust import Line
 from bentwing.report.charts import BoxGroup, Sample, box_plot, histogram, scatter
 from bentwing.report.error_map import draw_error_map, write_error_cloud
+from bentwing.report.evaluation_page import evaluation_page
 from bentwing.report.plot import Series, line_plot
 from bentwing.report.svg import standalone
 
@@ -25,12 +26,20 @@ _CM = 100.0
 _DEGREES = 180.0 / np.pi
 
 
-def draw_evaluation(folder: EvaluationFolder, evaluation: Evaluation) -> None:
-    """Write a figure for every answer that has a distribution."""
+def draw_evaluation(folder: EvaluationFolder, evaluation: Evaluation, name: str) -> None:
+    """Write a figure for every answer that has a distribution, and a page of all answers.
+
+    Parameters
+    ----------
+    name : of what was evaluated
+    """
     if evaluation.map is not None:
         write_error_cloud(folder.file("map_error.ply"), evaluation.map)
-    for name, drawing in evaluation_drawings(evaluation).items():
-        write_text(folder.file(f"{name}.svg"), standalone(drawing))
+    drawings = evaluation_drawings(evaluation)
+    for kind, drawing in drawings.items():
+        write_text(folder.file(f"{kind}.svg"), standalone(drawing))
+    page = evaluation_page(evaluation, drawings, name)
+    write_text(folder.file("evaluation.html"), page)
 
 
 def evaluation_drawings(evaluation: Evaluation) -> dict[str, str]:

@@ -13,7 +13,10 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from bentwing.report.sections import Row
-_TOLD = {"messages", "fixes", "used", "rejected", "rms_horizontal", "rms_vertical", "runs"}
+_TOLD = {
+    "messages", "fixes", "used", "rejected", "rms_horizontal", "rms_vertical", "runs", "leap_seconds",
+}  # fmt: skip
+_QUALITY = "of_quality_"
 
 
 def on_earth_section(found: Mapping[str, Any] | None) -> str:
@@ -64,8 +67,20 @@ def _fixes(fixes: Mapping[str, Any]) -> list[Row]:
     unusable = {
         name.replace("_", " "): n
         for name, n in fixes.items()
-        if name not in _TOLD and isinstance(n, int) and n
+        if name not in _TOLD and not name.startswith(_QUALITY) and isinstance(n, int) and n
     }
+    kinds = [
+        f"{n:,} {k.removeprefix(_QUALITY)}" for k, n in fixes.items() if k.startswith(_QUALITY)
+    ]
+    if kinds:
+        rows.append(("kinds of solutions", ", ".join(kinds)))
+    if fixes.get("leap_seconds"):
+        rows.append(
+            (
+                "seconds by which the times of the fixes were ahead of UTC",
+                str(fixes["leap_seconds"]),
+            )
+        )
     if unusable:
         said = ", ".join(f"{n:,} with {name}" for name, n in unusable.items())
         rows.append(("GNSS messages that could not be used", said))

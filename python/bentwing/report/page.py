@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-from html import escape
-from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
 from bentwing.base.atomic import write_text
@@ -12,6 +10,8 @@ from bentwing.report import evidence
 from bentwing.report.cover import cover, title_of
 from bentwing.report.drawn import Drawn
 from bentwing.report.engineering import engineering_section
+from bentwing.report.html_page import html_page
+from bentwing.report.localization import localization_section
 from bentwing.report.merging import merging_section
 from bentwing.report.on_earth import on_earth_section
 from bentwing.report.texts import ENGLISH, Texts
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
     from bentwing.base.trajectory import Trajectory
     from bentwing.evaluate.revisits import Revisits
+    from bentwing.map.change import Change
     from bentwing.report.engineering import Spin
 
 
@@ -35,6 +36,7 @@ def write_report(
     trajectory: Trajectory,
     map_sample: tuple[NDArray[np.float64], NDArray[np.float64]],
     revisits: Revisits | None = None,
+    change: Change | None = None,
     spin: Spin | None = None,
     cost: Callable[[], Mapping[str, Any]] | None = None,
     texts: Texts = ENGLISH,
@@ -48,6 +50,7 @@ def write_report(
     trajectory : of the IMU in the map; may be empty after a failure
     map_sample : points (N, 3) m in the map and their times (N,) s; may be empty
     revisits : how well what was seen twice agrees in the map
+    change : what has changed since the map in which the recording was localized
     spin : times (M,) s and rate of turn (M,) rad/s of the sensor head
     cost : what run.json will say of time and memory, asked once all is drawn; default: what it says now
     texts : words of the language
@@ -58,16 +61,11 @@ def write_report(
         evidence.map_section(drawn),
         evidence.coverage_section(drawn),
         evidence.agreement_section(*map_sample, revisits, texts),
+        localization_section(drawn, change),
         on_earth_section(run_json.get("georeference")),
         merging_section(run_json.get("merging")),
     ]
     described = {**run_json, **cost()} if cost is not None else run_json
     parts.append(engineering_section(described, trajectory, spin, texts))
-    style = files("bentwing.report").joinpath("style.css").read_text(encoding="utf-8")
-    page = (
-        f'<!doctype html>\n<html lang="{texts.language}"><head><meta charset="utf-8">'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<title>{escape(title_of(run_json, texts))}</title><style>{style}</style></head>"
-        f"<body><main>{''.join(parts)}</main></body></html>\n"
-    )
+    page = html_page(title_of(run_json, texts), "".join(parts), texts.language)
     write_text(path, page)

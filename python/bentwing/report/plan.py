@@ -48,16 +48,23 @@ class Mark:
     ----------
     name : of it
     place : (2,) m, shown coordinates
-    is_check : whether it only measures the map
+    is_check : whether it only measures the map; None for a name without a symbol
     """
 
     name: str
     place: tuple[float, float]
-    is_check: bool
+    is_check: bool | None
 
 
 def draw_plan(
-    view: View, frame: ShownFrame, *, way: Way, marks: Sequence[Mark] = (), name: str = "Plan"
+    view: View,
+    frame: ShownFrame,
+    *,
+    way: Way,
+    marks: Sequence[Mark] = (),
+    table: tuple[str, ...] = HEIGHT,
+    key: Sequence[tuple[str, str]] = (),
+    name: str = "Plan",
 ) -> str:
     """Draw a plan as SVG.
 
@@ -67,6 +74,8 @@ def draw_plan(
     frame : which has the origin of the grid, and says whether north is up
     way : of the sensor
     marks : surveyed points
+    table : colour map of the heights
+    key : colours of other things, and what these are
     name : says what is seen, for those who cannot see it
     """
     height, width, _ = view.image.shape
@@ -82,7 +91,8 @@ def draw_plan(
         draw_way(view, way),
         *_marked(marks, view),
         *scale_bar(view, foot, _SIZE),
-        *legend(view, "height, m", HEIGHT, (float(wide), foot - 10.0), _SIZE),
+        *legend(view, "height, m", table, (float(wide), foot - 10.0), _SIZE),
+        *_key(key, float(wide), foot),
     ]
     if frame.is_north_up:
         parts.append(_north(width - 40.0, 14.0))
@@ -111,6 +121,17 @@ def _grid(view: View, origin: NDArray[np.float64]) -> list[str]:
                 f'<text x="-10" y="{at:.1f}" {turned} text-anchor="middle" fill="{INK}" '
                 f'font-size="{_SIZE}">{coordinate(y)}</text>'
             )
+    return parts
+
+
+def _key(key: Sequence[tuple[str, str]], right: float, y: float) -> list[str]:
+    """Draw what colours mean, from the right."""
+    parts = []
+    for colour, meaning in reversed(key):
+        parts.append(text(right, y + 6, meaning, "end", INK, _SIZE))
+        right -= 0.58 * _SIZE * len(meaning) + 24
+        parts.append(f'<rect x="{right:.0f}" y="{y - 9}" width="15" height="15" fill="#{colour}"/>')
+        right -= 22
     return parts
 
 
@@ -153,7 +174,9 @@ def _overlap(a: Box, b: Box) -> bool:
     return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
 
 
-def _symbol(x: float, y: float, is_check: bool) -> str:  # noqa: FBT001 - it is what is drawn
+def _symbol(x: float, y: float, is_check: bool | None) -> str:  # noqa: FBT001 - it is what is drawn
+    if is_check is None:
+        return ""
     r = _MARK
     shape = f"M{-r} {-r}H{r}V{r}H{-r}Z" if is_check else f"M0 {-r - 2}L{r + 1} {r}H{-r - 1}Z"
     return (

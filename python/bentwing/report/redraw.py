@@ -15,7 +15,7 @@ from bentwing.base.progress import as_progress
 from bentwing.base.provenance import describe_input
 from bentwing.base.run_record import RECORD
 from bentwing.evaluate.revisits import revisit_consistency
-from bentwing.report.finished import FinishedRun
+from bentwing.report.finished import ShownRun
 from bentwing.report.page import write_report
 from bentwing.report.pdf import find_browser, write_pdf
 
@@ -59,8 +59,8 @@ def redraw_report(
         If a file in it cannot be read.
     """
     browser = find_browser() if pdf else None
-    shown, finished = as_progress(progress), FinishedRun.open(run)
-    folder, record = finished.folder, finished.record
+    shown, finished = as_progress(progress), ShownRun.open(run)
+    folder, record = finished.run.folder, finished.run.record
     if project is not None:
         record["project"] = plain(project.model_dump())
     lock = FolderLock(folder)
@@ -75,6 +75,7 @@ def redraw_report(
                 trajectory=finished.trajectory,
                 map_sample=(points, times),
                 revisits=revisit_consistency(points, times) if len(points) else None,
+                change=finished.change(),
             )
         written = [folder / PAGE]
         if browser is not None:
@@ -88,15 +89,16 @@ def redraw_report(
     return written
 
 
-def _sample(finished: FinishedRun) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _sample(finished: ShownRun) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return every k-th point of the map and its time, in the order of time."""
-    n = int((finished.record.get("counts") or {}).get("map.written", 0))
+    n = int((finished.run.record.get("counts") or {}).get("map.written", 0))
     step = 1
     while n > step * _MOST:
         step *= 2
     skipped = 0
     points, times = [np.empty((0, 3))], [np.empty(0)]
-    for places, moments in finished.parts():
+    drawn = finished.parts(measured=True) if finished.run.map_path is not None else ()
+    for places, moments in drawn:
         chosen = slice(-skipped % step, None, step)
         points.append(places[chosen])
         times.append(moments[chosen])

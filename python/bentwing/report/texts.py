@@ -118,6 +118,19 @@ class Texts:
     )
     visited_again: str = "Places seen again"
     agreement: str = "Agreement of the map with itself"
+    localization: str = "Place in the given map"
+    changes: str = "What has changed since the map"
+    changes_note: str = (
+        "Something has appeared where the map was seen to be empty, and has disappeared where the recording "
+        "looked through it. What neither of them saw counts as neither."
+    )
+    unchanged: str = "Nothing has changed that is larger than 0.1 m² seen from above."
+    change: str = "change"
+    kinds: dict[str, str] = field(
+        default_factory=lambda: {"appeared": "appeared", "disappeared": "disappeared"}
+    )
+    changes_plan: str = "Plan of changes"
+    changes_plan_note: str = "Numbers as in the table. Orange has appeared, blue has disappeared, grey is the map of this recording."
     engineering: str = "Engineering details"
     engineering_note: str = (
         "Motion, estimate, calibration, settings and versions, for those who check the method."

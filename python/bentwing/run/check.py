@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from bentwing.base.errors import UsageError
+from bentwing.run.gnss import fixes_of
 from bentwing.run.head import Head
 
 if TYPE_CHECKING:
@@ -35,8 +36,11 @@ def opened(
     require_coordinates(settings.georeferencing)
     with Head(paths, settings, progress) as head:
         recording = head.recording
-        require_effect(settings.georeferencing, recording.paths[0], is_placed=recording.has_fixes)
+        has_fixes = recording.has_fixes or settings.georeferencing.fixes is not None
+        require_effect(settings.georeferencing, recording.paths[0], is_placed=has_fixes)
         _require_part(head.recording, settings.start)
+        if settings.georeferencing.fixes is not None:  # before the hours of work that come first
+            fixes_of(recording, settings.georeferencing, settings.start, settings.duration)
         head.require_fit()
         yield head
 

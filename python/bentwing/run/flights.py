@@ -57,6 +57,9 @@ def map_flights(
                 "and merge the runs"
             )
             raise UsageError(msg)
+    if settings.loops:
+        msg = f"--loops with {len(flights)} flights: their times are of one recording; map each by itself"
+        raise UsageError(msg)
     shown, names = as_progress(progress), flight_names(flights)
     merging = merge_settings(
         map_format=settings.map_format,

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from bentwing.evaluate.expected import ExpectedAccuracy
     from bentwing.evaluate.revisits import Revisits
     from bentwing.evaluate.verdict import Evidence, Reason
+    from bentwing.map.change import Change
     from bentwing.recording import Batch, Payload
 
     Placed: TypeAlias = Georeferenced | GivenCoordinates
@@ -82,7 +83,8 @@ class WrittenMap:
     record : how it was cleaned, for run.json
     sample : evenly chosen points, in the frame of the trajectory
     revisits : how well they agree that were seen twice, if any were
-    change : points that have appeared and disappeared since the prior map, for run.json
+    change : what has appeared and disappeared since the prior map
+    compared : what run.json says of that
     """
 
     path: Path
@@ -90,7 +92,8 @@ class WrittenMap:
     record: dict[str, Any]
     sample: MapSample
     revisits: Revisits | None = None
-    change: dict[str, int] | None = None
+    change: Change | None = None
+    compared: Record = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,8 +171,8 @@ class Found:
         if written is not None:
             counts.update(written.counts)
         localization = self.localization
-        if localization is not None and written is not None and written.change is not None:
-            localization = {**localization, **written.change}
+        if localization is not None and written is not None:
+            localization = {**localization, **written.compared}
         return {
             "counts": counts,
             "clocks": self.reading.clocks,

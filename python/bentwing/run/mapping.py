@@ -111,12 +111,13 @@ def write_map(
     revisits = revisit_consistency(points, sample.times) if len(points) else None
     if difference is None:
         return WrittenMap(path, counts, record, sample, revisits)
-    clouds = {"appeared": difference.appeared, "disappeared": difference.disappeared}
+    change = difference.change
+    clouds = {"appeared": change.appeared, "disappeared": change.disappeared}
     for name, points in clouds.items():
         changed = folder.file(f"{name}.{settings.map_format}")
         with _open(changed, settings, origin_ns, placed) as writer:
             writer.write(untimed(_projected(points, placed)))
-    return WrittenMap(path, counts, record, sample, revisits, difference.record)
+    return WrittenMap(path, counts, record, sample, revisits, change, difference.record)
 
 
 def clock_of(sources: Sequence[MapSource]) -> tuple[int, NDArray[np.float64]]:

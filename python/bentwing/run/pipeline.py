@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from bentwing import odometry
 from bentwing.base.progress import as_progress
+from bentwing.closing.loop_file import read_loops
 from bentwing.recording.frames import placed_payload
 from bentwing.recording.sections.project import as_project
 from bentwing.run import stages
@@ -51,6 +52,7 @@ def map_recording(
     georeferencing: GeoreferenceSettings | None = None,
     project: Project | Path | str | None = None,
     loop_closure: bool = True,
+    loops: Path | str | None = None,
     write_map: bool = True,
     prior_map: Path | str | None = None,
     settings: EstimatorSettings | Path | str | None = None,
@@ -78,6 +80,7 @@ def map_recording(
         names their topic, as a rigid fit
     project : what the first page of the report names, or a YAML file of it; default: the payload's
     loop_closure : whether places seen again may correct the trajectory
+    loops : YAML file of times at which the same place was seen, or was not, as you know
     write_map : whether there is a map; without one the run ends with its trajectory, much sooner
     prior_map : a run folder or a cloud in which the recording is localized: trajectory and map are
         then in its frame, and the points that have changed are written too
@@ -106,6 +109,7 @@ def map_recording(
         georeferencing=georeferencing,
         project=as_project(project),
         loop_closure=None if loop_closure else False,
+        loops=None if loops is None else read_loops(Path(loops)),
         writes_map=None if write_map else False,
         prior_map=prior_map,
         threads=threads,

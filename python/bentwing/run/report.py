@@ -68,6 +68,7 @@ def _write(
         trajectory=trajectory,
         map_sample=(points, times),
         revisits=None if found.map is None else found.map.revisits,
+        change=None if found.map is None else found.map.change,
         spin=found.spin.series,
         cost=lambda: folder.record.settle(time.monotonic() - started),
     )

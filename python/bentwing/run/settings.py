@@ -4,10 +4,10 @@
 from __future__ import annotations
 
 from pathlib import Path  # noqa: TC003 - pydantic reads the annotations
-from typing import Annotated, Any, Literal, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
 import yaml
-from pydantic import BaseModel, Field, ValidationError, field_validator
+from pydantic import BaseModel, Field, ValidationError, field_validator, model_validator
 
 from bentwing.base.errors import BentwingError, UsageError
 from bentwing.base.plain import plain
@@ -17,6 +17,7 @@ from bentwing.base.units import Metres, Unit
 from bentwing.base.validation import describe
 from bentwing.closing.georeference.settings import GeoreferenceSettings
 from bentwing.closing.global_registration.settings import GlobalSettings
+from bentwing.closing.loop_file import NamedLoop  # noqa: TC001 - pydantic reads it
 from bentwing.map.clean import CleanSettings
 from bentwing.map.formats import MapFormat, require_format
 from bentwing.odometry import (
@@ -30,6 +31,9 @@ from bentwing.odometry import (
 )
 from bentwing.recording import Payload
 from bentwing.recording.sections.project import Project  # noqa: TC001 - pydantic reads it
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
 
 MOST_SECONDS = 1e9
 """No recording lasts for thirty years."""
@@ -111,6 +115,9 @@ class RunSettings(MapSettings):
         default=GlobalSettings(),
         description="how loops are closed; false leaves the trajectory open-loop",
     )
+    loops: tuple[NamedLoop, ...] = Field(
+        default=(), description="times at which the same place was seen, or not, as a user knows"
+    )
     prior_map: Path | None = Field(
         default=None, description="map in which the recording is localized"
     )
@@ -142,6 +149,14 @@ class RunSettings(MapSettings):
     )
     ndt: NdtSettings = Field(default=NdtSettings(), description="settings of the NDT odometry")
     payload: Payload = Field(default_factory=Payload.default, description="the sensor head")
+
+    @model_validator(mode="after")
+    def _closes_its_loops(self) -> Self:
+        if self.loops and (self.loop_closure is False or self.prior_map is not None):
+            what = "loop closure is off" if self.prior_map is None else "a given map closes them"
+            msg = f"loops are named, but {what}: leave one of them out"
+            raise ValueError(msg)
+        return self
 
     @field_validator("estimator", mode="before")
     @classmethod

@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING
 from bentwing.base.errors import NotEnoughDataError
 from bentwing.base.progress import Progress
 from bentwing.evaluate.verdict import judge_closing, judge_revisits
+from bentwing.run.gnss import NO_LEVER, receivers_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from bentwing.base.estimate import Estimate
     from bentwing.base.progress import Stage
-    from bentwing.closing.georeference.receivers import Receivers
     from bentwing.closing.localize import Difference, PriorMap
     from bentwing.map.chunk import MapChunk
     from bentwing.recording.preprocess import RecordingPart
@@ -66,7 +66,8 @@ def close(job: Job, found: Found) -> Found:
         open_loop = _known(found)
     with job.folder.stage("loops"), job.progress.stage("loops", part.length) as shown:
         batches = part.batches(shown, Counter())  # the first pass has counted what is dropped
-        if len(open_loop.segments) > 1 and job.prior is None:
+        is_cut = len(open_loop.segments) > 1
+        if (is_cut or job.settings.loops) and job.prior is None:
             from bentwing.closing.joining.segments import close_segments
 
             closed, merging = close_segments(
@@ -75,9 +76,10 @@ def close(job: Job, found: Found) -> Found:
                 part.payload,
                 settings=closing,
                 budget=budget,
+                loops=job.settings.loops,
                 threads=threads,
             )
-            found = replace(found, merging=merging)
+            found = replace(found, merging=merging if is_cut else None)
         else:
             near = None if job.prior is None else job.prior.surfels_near(open_loop.trajectory)
             closed = close_loops(
@@ -116,7 +118,8 @@ def place_on_earth(job: Job, found: Found) -> Found:
     estimate, part, settings = _known(found), job.part, job.settings.georeferencing
     if job.prior is not None:
         return replace(found, placed=job.prior.coordinates)
-    if part.payload.gnss is None and settings.control_points is None:
+    named = (part.payload.gnss, settings.fixes, settings.control_points)
+    if all(one is None for one in named):
         return found
     from bentwing.closing.georeference.georeference import georeference
 
@@ -124,7 +127,7 @@ def place_on_earth(job: Job, found: Found) -> Found:
         try:
             placed = georeference(
                 estimate.trajectory,
-                receivers_of(part),
+                receivers_of(part, settings),
                 settings,
                 segments=estimate.segments,
                 reach=part.payload.lidar.max_range,
@@ -140,17 +143,9 @@ def place_on_earth(job: Job, found: Found) -> Found:
         estimate = replace(
             estimate, trajectory=placed.trajectory, covariances=None, short_variances=None
         )
-    warnings = (*found.stage_warnings, *placed.warnings)
+    lacking = (NO_LEVER,) if part.payload.gnss is None and settings.fixes is not None else ()
+    warnings = (*found.stage_warnings, *lacking, *placed.warnings)
     return replace(found, estimate=estimate, placed=placed, stage_warnings=warnings)
-
-
-def receivers_of(part: RecordingPart, name: str = "") -> Receivers | None:
-    """Return the GNSS fixes of a part of a recording; None without any."""
-    from bentwing.closing.georeference.receivers import Receivers
-
-    gnss = part.payload.gnss
-    fixes = part.recording.fixes(part.start, part.duration)
-    return None if gnss is None or fixes is None else Receivers.one(fixes, gnss.lever_arm, name)
 
 
 def make_map(job: Job, found: Found) -> Found:

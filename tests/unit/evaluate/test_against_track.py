@@ -308,3 +308,17 @@ def test_drift_boxes_hold_a_stretched_way_and_a_slow_turn():
     for part in drift_boxes(turning, truth):
         assert part.heading.median == pytest.approx(1e-4, rel=0.03)
         assert abs(part.tilt.median) < 1e-6
+
+
+def test_without_alignment_the_coordinates_count_in_which_the_map_is_written(estimate):
+    """A georeferenced run whose trajectory is local, against a reference in its projected system."""
+    place = np.array([500_000.0, 5_300_000.0, 400.0])
+    reference = Trajectory(estimate.times, estimate.positions + place, estimate.quats_xyzw)
+    track = as_track(reference)
+    local = compare_with_track(estimate, ORIGIN, track).unaligned
+    assert local.position.median == pytest.approx(float(np.linalg.norm(place)), rel=1e-6)
+    written = compare_with_track(estimate, ORIGIN, track, written=lambda p: p + place).unaligned
+    assert written.position.maximum < 1e-6
+    assert {name: box.mean for name, box in written.axes.items()} == pytest.approx(
+        {"x": 0.0, "y": 0.0, "z": 0.0}, abs=1e-6
+    )

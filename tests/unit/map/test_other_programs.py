@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from bentwing.base.geodesy import ProjectedSystem
+from bentwing.base.gps_time import adjusted_gps_origin
 from bentwing.map.chunk import MapChunk
-from bentwing.map.gps_time import adjusted_gps_origin
 from bentwing.map.writer import open_map
 
 ORIGIN_NS = 1_700_000_000_000_000_000

@@ -11,9 +11,9 @@ import pytest
 
 from bentwing.base.errors import EstimationError, InputError, UsageError
 from bentwing.base.geodesy import ProjectedSystem
+from bentwing.base.gps_time import adjusted_gps_origin
 from bentwing.map.chunk import MapChunk
 from bentwing.map.formats import FORMATS, MAP_FORMATS, load
-from bentwing.map.gps_time import adjusted_gps_origin
 from bentwing.map.read import read_points
 from bentwing.map.writer import MapWriter, open_map
 

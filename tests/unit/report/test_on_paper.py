@@ -14,7 +14,7 @@ from bentwing.base.trajectory import Trajectory
 from bentwing.map.chunk import MapChunk
 from bentwing.map.writer import open_map
 from bentwing.recording.sections.project import Project
-from bentwing.report.finished import FinishedRun
+from bentwing.report.finished import ShownRun
 from bentwing.report.pdf import BROWSER
 from bentwing.report.redraw import redraw_report
 from bentwing.run.folder import RunFolder
@@ -100,7 +100,7 @@ def test_runs_of_a_merged_map_follow_each_other(tmp_path, begin_together):
         for n, s in zip(names, starts, strict=True)
     ]
     (tmp_path / "site" / "run.json").write_text(json.dumps(record))
-    finished = FinishedRun.open(tmp_path / "site")
+    finished = ShownRun.open(tmp_path / "site")
     assert finished.trajectory.times[[0, -1]] == pytest.approx([0.0, 70.0], abs=1e-6)
     points, times = (np.concatenate(part) for part in zip(*finished.parts(), strict=True))
     assert times[points[:, 2] < 5].max() < 30.001

@@ -13,7 +13,7 @@ from evo.tools import file_interface
 from laspy.copc import CopcReader
 from pyproj import Transformer
 
-from bentwing import export, export_points
+from bentwing import ExportOptions, export, export_points
 from bentwing.base.errors import InputError, UsageError
 from bentwing.map import Crop, Polygon
 from bentwing.map.read import read_points
@@ -39,12 +39,23 @@ def placed_run(points, tmp_path_factory):
     return finished_run(tmp_path_factory.mktemp("export") / "placed", points, placed=on_earth())
 
 
+def exported(run, path, *, tiles=None, map_format=None, trajectory_format=None, **options):
+    return export(
+        run,
+        path,
+        ExportOptions(**options),
+        tiles=tiles,
+        map_format=map_format,
+        trajectory_format=trajectory_format,
+    )
+
+
 def ordered(points):
     return points[np.lexsort(np.round(points, 3).T)]
 
 
 def test_a_map_as_it_is_has_all_points_and_attributes(local_run, tmp_path):
-    export(local_run, tmp_path / "out.laz")
+    exported(local_run, tmp_path / "out.laz")
     before, after = laspy.read(local_run / "map.laz"), laspy.read(tmp_path / "out.laz")
     for name in before.point_format.dimension_names:
         assert np.array_equal(before[name], after[name]), name
@@ -53,7 +64,7 @@ def test_a_map_as_it_is_has_all_points_and_attributes(local_run, tmp_path):
 
 def test_every_format_and_an_octree_have_the_same_points(local_run, points, tmp_path):
     for name, worst in [("a.copc.laz", STEP), ("a.las", STEP), ("a.ply", STEP), ("a.pcd", STEP)]:
-        export(local_run, tmp_path / name)
+        exported(local_run, tmp_path / name)
         found = read_points(tmp_path / name)
         assert np.abs(np.sort(found, axis=0) - np.sort(points, axis=0)).max() <= worst, name
     with CopcReader.open(tmp_path / "a.copc.laz") as reader:
@@ -62,7 +73,7 @@ def test_every_format_and_an_octree_have_the_same_points(local_run, points, tmp_
 
 def test_crops_and_spacing_act_together(local_run, points, tmp_path):
     crop = Crop(box=(-5, -5, -1, 9, 9, 3), area=Polygon.of([[-9, -9], [9, -9], [9, 9]]), within=4.0)
-    done = export(local_run, tmp_path / "out.las", crop=crop, spacing=0.5)
+    done = exported(local_run, tmp_path / "out.las", crop=crop, spacing=0.5)
     x, y, _ = points.T
     inside = np.all((points >= [-5, -5, -1]) & (points <= [9, 9, 3]), axis=1) & (y < x)
     path = flight().positions[::5]
@@ -76,7 +87,7 @@ def test_crops_and_spacing_act_together(local_run, points, tmp_path):
 
 
 def test_times_are_those_of_the_recording(local_run, tmp_path):
-    export(local_run, tmp_path / "out.las", crop=Crop(times=(5.0, 7.5)))
+    exported(local_run, tmp_path / "out.las", crop=Crop(times=(5.0, 7.5)))
     times = laspy.read(tmp_path / "out.las").gps_time
     expected = np.linspace(0.0, 19.9, N)
     assert len(times) == np.count_nonzero((expected >= 5) & (expected <= 7.5))
@@ -86,7 +97,7 @@ def test_times_are_those_of_the_recording(local_run, tmp_path):
 def test_coordinates_of_the_trajectory_come_back_from_a_map_on_the_earth(
     placed_run, points, tmp_path
 ):
-    export(placed_run, tmp_path / "out.las", local=True)
+    exported(placed_run, tmp_path / "out.las", local=True)
     # the rounding of the map, of the export, and of the polynomial that made the map
     assert np.abs(read_points(tmp_path / "out.las") - points).max() < 2 * STEP
     with laspy.open(tmp_path / "out.las") as file:
@@ -94,10 +105,10 @@ def test_coordinates_of_the_trajectory_come_back_from_a_map_on_the_earth(
 
 
 def test_another_projected_system_is_the_one_that_pyproj_finds(placed_run, tmp_path):
-    export(placed_run, tmp_path / "out.copc.laz", epsg=32633, crop=Crop(within=10.0))
+    exported(placed_run, tmp_path / "out.copc.laz", epsg=32633, crop=Crop(within=10.0))
     found = laspy.read(tmp_path / "out.copc.laz")
     assert found.header.parse_crs().to_epsg() == 32633
-    export(placed_run, tmp_path / "same.las", crop=Crop(within=10.0))
+    exported(placed_run, tmp_path / "same.las", crop=Crop(within=10.0))
     x, y, _ = read_points(tmp_path / "same.las").T
     there = Transformer.from_crs("EPSG:32632", "EPSG:32633", always_xy=True).transform(x, y)
     in_time = np.argsort(found.gps_time)
@@ -108,7 +119,7 @@ def test_another_projected_system_is_the_one_that_pyproj_finds(placed_run, tmp_p
 def test_a_distance_from_the_path_is_the_same_in_every_system(placed_run, points, tmp_path):
     counts = []
     for name, options in [("a", {}), ("b", {"local": True}), ("c", {"epsg": 32633})]:
-        done = export(placed_run, tmp_path / f"{name}.las", crop=Crop(within=3.0), **options)
+        done = exported(placed_run, tmp_path / f"{name}.las", crop=Crop(within=3.0), **options)
         counts.append(done.n_points)
     path = flight().positions
     near = np.array([np.linalg.norm(path - point, axis=1).min() for point in points])
@@ -130,7 +141,7 @@ def test_an_area_in_degrees_cuts_a_map_on_the_earth(placed_run, points, tmp_path
     for name, ring, more in [("deg", degrees, {}), ("utm", projected[:, :2], {"crs": named})]:
         area = {"type": "Polygon", "coordinates": [ring.tolist()], **more}
         (tmp_path / f"{name}.geojson").write_text(json.dumps(area))
-        done = export(placed_run, tmp_path / f"{name}.las", polygon=tmp_path / f"{name}.geojson")
+        done = exported(placed_run, tmp_path / f"{name}.las", polygon=tmp_path / f"{name}.geojson")
         assert abs(done.n_points - expected) <= 5
 
 
@@ -139,17 +150,17 @@ def test_small_numbers_are_metres_where_the_run_is_in_a_frame_of_its_own(
 ):
     area = {"type": "Polygon", "coordinates": [[[0, 0], [5, 0], [5, 5], [0, 5]]]}
     (tmp_path / "a.geojson").write_text(json.dumps(area))
-    done = export(local_run, tmp_path / "a.las", polygon=tmp_path / "a.geojson")
+    done = exported(local_run, tmp_path / "a.las", polygon=tmp_path / "a.geojson")
     expected = np.all((points[:, :2] >= 0) & (points[:, :2] < 5), axis=1)
     assert abs(done.n_points - np.count_nonzero(expected)) <= 3
     area["crs"] = {"type": "name", "properties": {"name": "EPSG:25832"}}
     (tmp_path / "b.geojson").write_text(json.dumps(area))
     with pytest.raises(UsageError, match="frame of its own"):
-        export(local_run, tmp_path / "b.las", polygon=tmp_path / "b.geojson")
+        exported(local_run, tmp_path / "b.las", polygon=tmp_path / "b.geojson")
 
 
 def test_the_points_come_as_arrays(local_run, points):
-    chunks = list(export_points(local_run, crop=Crop(heights=(0, 2))))
+    chunks = list(export_points(local_run, ExportOptions(crop=Crop(heights=(0, 2)))))
     found = np.concatenate([chunk.points for chunk in chunks])
     assert np.abs(found[:, 2] - 1).max() <= 1
     assert len(found) == np.count_nonzero((np.round(points[:, 2], 4) >= 0) & (np.round(points[:, 2], 4) <= 2))  # fmt: skip
@@ -175,18 +186,18 @@ def test_the_points_come_as_arrays(local_run, points):
 )
 def test_what_cannot_be_is_refused_and_leaves_nothing(local_run, tmp_path, options, said):
     with pytest.raises(UsageError, match=said):
-        export(local_run, tmp_path / "out.laz", **options)
+        exported(local_run, tmp_path / "out.laz", **options)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_name_that_says_no_format_and_one_that_is_taken_are_refused(local_run, tmp_path):
     with pytest.raises(UsageError, match=r"\.copc\.laz"):
-        export(local_run, tmp_path / "out.xyz")
+        exported(local_run, tmp_path / "out.xyz")
     (tmp_path / "out.laz").touch()
     with pytest.raises(UsageError, match="exists already"):
-        export(local_run, tmp_path / "out.laz")
+        exported(local_run, tmp_path / "out.laz")
     with pytest.raises(UsageError, match="no folder"):
-        export(local_run, tmp_path / "none" / "out.laz")
+        exported(local_run, tmp_path / "none" / "out.laz")
 
 
 @pytest.mark.parametrize(
@@ -200,7 +211,7 @@ def test_a_name_that_says_no_format_and_one_that_is_taken_are_refused(local_run,
 def test_what_the_map_does_not_have_needs_the_recording(points, tmp_path, options, reason):
     run = finished_run(tmp_path / "run", points, map_spacing=0.05)
     with pytest.raises(InputError, match=rf"{reason}.*gone\.bag"):
-        export(run, tmp_path / "out.laz", **options)
+        exported(run, tmp_path / "out.laz", **options)
 
 
 def test_a_map_that_was_changed_is_refused(local_run, tmp_path):
@@ -209,7 +220,7 @@ def test_a_map_that_was_changed_is_refused(local_run, tmp_path):
     data[-3000] ^= 1
     (run / "map.laz").write_bytes(data)
     with pytest.raises(InputError, match="SHA-256"):
-        export(run, tmp_path / "out.laz")
+        exported(run, tmp_path / "out.laz")
 
 
 def test_a_run_that_is_not_complete_and_a_folder_of_something_else_are_refused(local_run, tmp_path):
@@ -217,20 +228,20 @@ def test_a_run_that_is_not_complete_and_a_folder_of_something_else_are_refused(l
     record = json.loads((run / "run.json").read_text())
     (run / "run.json").write_text(json.dumps({**record, "complete": False}))
     with pytest.raises(UsageError, match="not complete"):
-        export(run, tmp_path / "out.laz")
+        exported(run, tmp_path / "out.laz")
     with pytest.raises(UsageError, match="holds no bentwing run"):
-        export(tmp_path, tmp_path / "out.laz")
+        exported(tmp_path, tmp_path / "out.laz")
     parts = {"maps": [{"folder": "map_1"}, {"folder": "map_2"}]}
     (run / "run.json").write_text(json.dumps({**record, "merging": parts}))
     with pytest.raises(UsageError, match="map_1"):
-        export(run, tmp_path / "out.laz")
+        exported(run, tmp_path / "out.laz")
 
 
 def test_other_programs_read_the_trajectory(local_run, tmp_path):
     """evo reads what KITTI, EuRoC and TUM have made the usual ones."""
     poses = flight()
     for name in ("a.tum", "a.kitti", "a.csv"):
-        export(local_run, tmp_path / name)
+        exported(local_run, tmp_path / name)
     tum = file_interface.read_tum_trajectory_file(tmp_path / "a.tum")
     euroc = file_interface.read_euroc_csv_trajectory(tmp_path / "a.csv")
     kitti = file_interface.read_kitti_poses_file(tmp_path / "a.kitti")
@@ -243,8 +254,8 @@ def test_other_programs_read_the_trajectory(local_run, tmp_path):
 
 
 def test_a_path_on_the_earth_is_in_degrees_with_times(placed_run, local_run, tmp_path):
-    export(placed_run, tmp_path / "a.geojson")
-    export(placed_run, tmp_path / "a.kml")
+    exported(placed_run, tmp_path / "a.geojson")
+    exported(placed_run, tmp_path / "a.kml")
     (feature,) = json.loads((tmp_path / "a.geojson").read_text())["features"]
     line = np.array(feature["geometry"]["coordinates"])
     place, shown = on_earth(), flight().positions[::10]
@@ -257,4 +268,4 @@ def test_a_path_on_the_earth_is_in_degrees_with_times(placed_run, local_run, tmp
     first = kml.partition("<coordinates>")[2].split()[0]
     assert np.allclose([float(v) for v in first.split(",")], line[0], atol=1e-9)
     with pytest.raises(UsageError, match="where on the Earth"):
-        export(local_run, tmp_path / "b.kml")
+        exported(local_run, tmp_path / "b.kml")

@@ -7,6 +7,7 @@ import textwrap
 from typing import TYPE_CHECKING, get_args
 
 from bentwing.recording.lidar_kinds import LidarKind
+from bentwing.recording.messages.gps_fix import GPS_FIX
 from bentwing.recording.topics import NAV_SAT_FIX
 
 if TYPE_CHECKING:
@@ -74,7 +75,7 @@ def of(payload: Payload, topics: Sequence[TopicInfo]) -> Iterator[str]:
     if not payload.self_hits:
         yield _CARRIER
     for topic in topics:
-        if payload.gnss is None and topic.type == NAV_SAT_FIX and topic.count:
+        if payload.gnss is None and topic.type in {NAV_SAT_FIX, *GPS_FIX} and topic.count:
             yield _GNSS.format(topic=topic.name)
 
 

@@ -11,6 +11,7 @@ from bentwing.base.settings import Settings
 from bentwing.closing.georeference.names import (
     GeoreferenceMode,  # noqa: TC001 - pydantic reads the annotations
 )
+from bentwing.recording.gnss_files.names import TimeScale  # noqa: TC001 - pydantic reads it
 
 
 class GeoreferenceSettings(Settings):
@@ -27,6 +28,14 @@ class GeoreferenceSettings(Settings):
         gt=0,
         le=2**31 - 1,
         description="projected system of the map; default: the UTM zone of the fixes",
+    )
+    fixes: Path | None = Field(
+        default=None,
+        description="file of GNSS fixes (RTKLIB .pos, NMEA 0183) instead of those of the recording",
+    )
+    fixes_time: TimeScale | None = Field(
+        default=None,
+        description="time scale of that file, `gps` or `utc`; default: what the file says",
     )
     control_points: Path | None = Field(
         default=None, description="CSV file of surveyed control and check points"

@@ -46,6 +46,7 @@ class Match:
     candidate : the places, by their numbers in the part, and what was found
     place_a, place_b : the places
     reason : why it is not believed, None if it is
+    is_named : whether a user has named it, so that nothing but what both places saw speaks against it
     """
 
     a: Part
@@ -54,6 +55,7 @@ class Match:
     place_a: Place
     place_b: Place
     reason: str | None
+    is_named: bool = False
 
     @property
     def believed(self) -> bool:

@@ -46,6 +46,9 @@ _LEVEL = 3e-3
 # What the registration that follows bridges without trouble is no contradiction, m and rad.
 _FALSE_SHIFT = 0.2
 _FALSE_TURN = np.radians(1.0)
+# So much more than by itself counts a match that a user has named: the way between bends until it is met,
+# however far it has drifted, and the registration that follows makes it exact.
+_NAMED = 1e4
 # Parts of the same run that nothing else connects stay roughly as the run had them, rad and m.
 _SAME_RUN = (0.2, 3.0)
 
@@ -209,14 +212,15 @@ class _Graph:
             link = link_between(self._poses[i], self._poses[j], match.alignment)
             ends.append((i, j))
             poses.append(from_poses(link.position, link.quat_xyzw))
-            information.append(link.information)
+            information.append(link.information * (_NAMED if match.is_named else 1.0))
         shape = np.array(poses).reshape(-1, 4, 4)
+        is_trusted = [True] * n_trusted + [match.is_named for match in matches]
         links = Links(
             np.array(ends, np.int64).reshape(-1, 2),
             np.ascontiguousarray(shape[:, :3, 3]),
             geometry.from_matrices(shape[:, :3, :3]) if len(shape) else np.zeros((0, 4)),
             np.array(information).reshape(-1, 6, 6),
-            np.arange(len(ends)) < n_trusted,
+            np.array(is_trusted, dtype=np.bool_),
         )
         return links, self.nodes
 

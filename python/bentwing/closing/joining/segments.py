@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 from bentwing.base.trajectory import DT
 from bentwing.closing.global_registration import Budget, Closed, GlobalSettings, register_jointly
-from bentwing.closing.global_registration.stretches import Stretches, length_of
+from bentwing.closing.global_registration.stretches import Stretches, length_of, segments_of
 from bentwing.closing.joining.describe import describe_matches, describe_parts_of
 from bentwing.closing.joining.matches import Match, Part, connected, find_matches, parts_of
+from bentwing.closing.joining.named_loops import denied_by, judge_loops, outcomes, without_denied
 from bentwing.closing.joining.placing import place_groups
 from bentwing.closing.joining.survey import survey
 from bentwing.odometry.segments import joined
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
     from bentwing.base.breaks import Break
     from bentwing.base.estimate import Estimate
+    from bentwing.closing.loop_file import NamedLoop
     from bentwing.recording import Batch, Payload
 
 NAME = "recording"
@@ -32,22 +34,26 @@ def close_segments(
     *,
     settings: GlobalSettings | None = None,
     budget: Budget | None = None,
+    loops: Sequence[NamedLoop] = (),
     threads: int | None = None,
 ) -> tuple[Closed, dict[str, Any]]:
     """Find the segments of an estimate in each other, and correct all of them as one.
+
+    Loops that a user names link places of one segment, too.
 
     A segment that shares no place with the others stays where the estimate has guessed it.
 
     Parameters
     ----------
-    estimate : with more than one segment
+    estimate : with more than one segment, or with loops
     batches : of the recording, as the estimator got them
     settings : of the registration; default: its defaults
     budget : what may be held
+    loops : that a user has named
 
     Returns
     -------
-    closed : the estimate, and what its registration did
+    closed : the estimate, and what its registration did; its record says what became of the loops
     record : which places were compared, for run.json
 
     Raises
@@ -70,7 +76,10 @@ def close_segments(
     trajectories = {
         Part(0, s): stretches.trajectory for s, stretches in enumerate(found.recorded.segments)
     }
-    groups, matches = place_groups(trajectories, parts, find_matches(parts))
+    named = judge_loops(loops, trajectories, parts)
+    links = [n.match for n in named if n.is_used and n.match is not None]
+    seen = without_denied(find_matches(parts), named)
+    groups, matches = place_groups(trajectories, parts, [*seen, *links])
     placed = {part: t for group in groups for part, t in group.trajectories.items()}
     segments = [
         Stretches(placed[Part(0, s)], stretches.surfels)
@@ -86,8 +95,21 @@ def close_segments(
     result = register_jointly([recorded], settings=settings, budget=budget, threads=threads)
     (closed,), warnings = result.estimates, list[str]()
     if result.failure is not None:
-        sentence = f"the segments were not registered with each other: {result.failure}"
-        warnings = [sentence]
+        what = "the segments were not registered with each other"
+        if len(segments) == 1:
+            what = (
+                "nothing but the loops named was closed" if links else "the loops were not closed"
+            )
+        warnings = [f"{what}: {result.failure}"]
+    if named:
+        after = dict(zip(trajectories, segments_of(closed), strict=True))
+        why = denied_by(named, trajectories, after)
+        if why is not None:
+            closed, after = estimate, trajectories
+            result.record.update(applied=False, reason=why)
+            warnings = [f"the loops were not closed, the trajectory is open-loop: {why}"]
+        result.record["named"], doubts = outcomes(named, trajectories, after)
+        warnings += doubts
     record = {
         "parts": describe_parts_of([NAME], parts),
         "candidates": describe_matches([NAME], matches),

@@ -3,12 +3,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bentwing.base.voxels import VoxelSet, pack, unpack, voxel_keys
 from bentwing.closing.places import FreeSpace, positions_at, seen_through
+from bentwing.map.change import Change
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -105,14 +106,13 @@ class Difference:
     ----------
     n_points : seen
     n_beyond : of them those where the map has nothing and nobody knows whether there was
-    appeared : (K, 3) m, 0.05 m apart, where the map was seen to be empty; once all has been seen
-    disappeared : (K, 3) m, 0.1 m apart, points of the map that the recording saw through
+    change : once all has been seen: what has appeared, 0.05 m apart, and disappeared, 0.1 m apart
     """
 
     def __init__(self, cloud: ReferenceCloud, trajectory: Trajectory) -> None:
         self.n_points = 0
         self.n_beyond = 0
-        self.appeared = self.disappeared = np.empty((0, 3))
+        self.change = Change(np.empty((0, 3)), np.empty((0, 3)))
         self._cloud = cloud
         self._trajectory = trajectory
         self._points = cloud.points
@@ -126,18 +126,21 @@ class Difference:
         for chunk in chunks:
             self._compare(chunk.points, positions_at(self._trajectory, chunk.times))
             yield chunk
-        self.appeared = _not_alone(np.concatenate([np.empty((0, 3)), *self._new]))
         gone = (self._n_looks >= _MIN_LOOKS) & ~self._filled.has(self._points)
-        self.disappeared = _not_alone(self._points[gone])
+        self.change = Change(
+            _not_alone(np.concatenate([np.empty((0, 3)), *self._new])),
+            _not_alone(self._points[gone]),
+        )
 
     @property
-    def record(self) -> dict[str, int]:
+    def record(self) -> dict[str, Any]:
         """What was found, for run.json."""
         return {
             "points": self.n_points,
             "points_beyond_map": self.n_beyond,
-            "appeared": len(self.appeared),
-            "disappeared": len(self.disappeared),
+            "appeared": len(self.change.appeared),
+            "disappeared": len(self.change.disappeared),
+            "changed_areas": self.change.areas(),
         }
 
     def _compare(self, points: NDArray[np.float64], origins: NDArray[np.float64]) -> None:

@@ -12,7 +12,7 @@ from bentwing.closing.places.cut import cut_places, describe_parts, describe_run
 from bentwing.closing.places.free_space import FreeSpace, seen_through
 from bentwing.closing.places.from_run import RunMap, map_of_run, places_of_cloud, places_of_run
 from bentwing.closing.places.link import PlaceLink, link_between
-from bentwing.closing.places.match import Candidate, match_places
+from bentwing.closing.places.match import Candidate, match_pair, match_places, verified
 from bentwing.closing.places.metric import Metric, default_metric, learn_metric
 from bentwing.closing.places.part import Part
 from bentwing.closing.places.place import Place, make_place
@@ -43,9 +43,11 @@ __all__ = [
     "link_between",
     "make_place",
     "map_of_run",
+    "match_pair",
     "match_places",
     "places_of_cloud",
     "places_of_run",
     "positions_at",
     "seen_through",
+    "verified",
 ]

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bentwing.base.errors import UsageError
+from bentwing.base.gps_time import adjusted_gps_origin
 from bentwing.base.run_record import finished_record
 from bentwing.base.trajectory import Trajectory, read_tum
 from bentwing.closing.places.cut import describe_parts
 from bentwing.closing.places.settings import PlaceSettings
 from bentwing.closing.places.stream import PartStream
 from bentwing.closing.places.tiles import tiled
-from bentwing.map.formats import MAP_SUFFIXES
-from bentwing.map.gps_time import adjusted_gps_origin
+from bentwing.map.finished_run import map_of
 from bentwing.map.read import read_parts
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ def map_of_run(folder: Path) -> RunMap:
     record = finished_record(folder)
     segments = [(float(a), float(b)) for a, b in record.get("segments") or []]
     begin = segments[0][0] if segments else 0.0
-    path = next((p for s in MAP_SUFFIXES if (p := folder / f"map{s}").exists()), None)
+    path = map_of(folder)
     if path is None:
         msg = f"{folder}: the run has no map; run `bentwing map` again, to its end and without --no-map"
         raise UsageError(msg)

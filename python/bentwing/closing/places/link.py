@@ -16,8 +16,6 @@ if TYPE_CHECKING:
 
     from bentwing.closing.places.refine import Alignment
 
-_INDEPENDENT = 0.05  # of the surfels: neighbours on one surface err alike
-
 
 @dataclass(frozen=True, slots=True)
 class PlaceLink:
@@ -52,7 +50,7 @@ def link_between(
     change = np.zeros((6, 6))
     change[:3, :3] = change[3:, 3:] = R
     change[3:, :3] = _cross_matrix(arm) @ R
-    information = _INDEPENDENT * change.T @ alignment.information @ change
+    information = alignment.INDEPENDENT * change.T @ alignment.information @ change
     return PlaceLink(
         T_node_other[:3, 3],
         geometry.from_matrices(T_node_other[:3, :3]),

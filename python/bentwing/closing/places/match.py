@@ -103,6 +103,40 @@ def match_places(
     return found
 
 
+def match_pair(
+    a: Place,
+    b: Place,
+    guesses: Sequence[NDArray[np.float64]],
+    *,
+    keypoints: bool = True,
+    settings: MatchSettings | None = None,
+) -> Candidate:
+    """Judge two places that somebody takes for the same.
+
+    Parameters
+    ----------
+    guesses : transforms (4, 4) from b's map to a's to begin with
+    keypoints : whether what looks alike may propose others
+    settings : default: those for all scenes
+    """
+    from scipy.spatial import cKDTree
+
+    settings = settings or MatchSettings()
+    proposed = [Hypothesis(T, 0) for T in guesses]
+    if keypoints:
+        proposed += hypotheses(a, b, default_metric(), settings.n_hypotheses)
+    trees = cKDTree(a.surfels.means), cKDTree(b.surfels.means)
+    best = _best((0, 0, 0.0), (a, b), trees, proposed, settings)
+    return best or Candidate(0, 0, 0.0, _FAR)
+
+
+def verified(a: Place, b: Place, T_a_b: NDArray[np.float64]) -> Agreement:
+    """Compare what two places saw, given the transform (4, 4) from b to a."""
+    from scipy.spatial import cKDTree
+
+    return verify(a, b, (cKDTree(a.surfels.means), cKDTree(b.surfels.means)), T_a_b)
+
+
 def _too_few(votes: float, settings: MatchSettings) -> str:
     if votes < settings.min_votes:
         return f"{votes:.1f} votes, {settings.min_votes:g} are needed"
@@ -117,11 +151,27 @@ def _tried(
     settings: MatchSettings,
 ) -> Candidate:
     """Verify a candidate by its geometry: the transform that fits best decides."""
+    proposed = hypotheses(*places, metric, settings.n_hypotheses)
+    promising = [h for h in proposed if h.n_inliers >= settings.min_inliers]
+    best = _best(named, places, trees, promising, settings)
+    if best is None:
+        most = max((h.n_inliers for h in proposed), default=0)
+        reason = f"{most} keypoints agree on a transform, {settings.min_inliers} are needed"
+        return Candidate(*named, reason, most)
+    return best
+
+
+def _best(
+    named: tuple[int, int, float],
+    places: tuple[Place, Place],
+    trees: tuple[cKDTree, cKDTree],
+    promising: list[Hypothesis],
+    settings: MatchSettings,
+) -> Candidate | None:
+    """Return what the hypothesis that fits best becomes; None without any."""
     a, b = places
     best: Candidate | None = None
-    proposed = hypotheses(a, b, metric, settings.n_hypotheses)
-    promising = [h for h in proposed if h.n_inliers >= settings.min_inliers]
-    promising.sort(key=lambda h: -quick_score(a, trees[0], b.surfels, h.T_a_b))
+    promising = sorted(promising, key=lambda h: -quick_score(a, trees[0], b.surfels, h.T_a_b))
     known: list[NDArray[np.float64]] = []
     for hypothesis in promising[: settings.n_refined]:
         tried = _judged(named, places, trees, hypothesis, settings, known=known)
@@ -129,10 +179,6 @@ def _tried(
             best = tried
         if best is not None and best.accepted:
             break
-    if best is None:
-        most = max((h.n_inliers for h in proposed), default=0)
-        reason = f"{most} keypoints agree on a transform, {settings.min_inliers} are needed"
-        return Candidate(*named, reason, most)
     return best
 
 

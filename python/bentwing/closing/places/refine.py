@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -59,6 +59,9 @@ class Alignment:
     about : (3,) m, map frame of a
     n_pairs : surfels that took part
     """
+
+    INDEPENDENT: ClassVar[float] = 0.05
+    """Share of the surfels that err by themselves: neighbours on one surface err alike."""
 
     T_a_b: NDArray[np.float64]
     information: NDArray[np.float64]

@@ -85,6 +85,11 @@ class Agreement:
             )
         return None
 
+    @property
+    def is_telling(self) -> bool:
+        """Whether so much could be seen from both places that it must be alike."""
+        return self.n_alike / max(self.agreement, 1e-3) >= _MIN_SURFELS
+
     def is_sure(self, settings: MatchSettings) -> bool:
         """Whether the places agree so well that nothing else need speak for it."""
         return self.agreement >= settings.min_sure_agreement + self._planeless()

@@ -10,10 +10,10 @@ import numpy as np
 
 from bentwing.base import geometry
 from bentwing.base.calibration import Calibration
+from bentwing.base.gps_time import adjusted_gps_origin
 from bentwing.base.mount import FixedMount
 from bentwing.base.run_record import read_record
 from bentwing.base.trajectory import Trajectory, read_tum
-from bentwing.map.gps_time import adjusted_gps_origin
 from bentwing.map.measured import moved_back
 
 if TYPE_CHECKING:

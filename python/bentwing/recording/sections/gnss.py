@@ -9,15 +9,15 @@ from bentwing.recording.sections.section import Lever, Section, Topic, Vector, r
 
 
 class Gnss(Section):
-    """GNSS fixes (NavSatFix), used only when named.
+    """GNSS receiver; its fixes (NavSatFix, GPSFix) are used only when named.
 
     Attributes
     ----------
-    topic : of the fixes
+    topic : of the fixes; None where they are in a file
     lever_arm : m, phase centre of the antenna in the IMU frame
     """
 
-    topic: Topic
+    topic: Topic | None = None
     lever_arm: Lever = (0.0, 0.0, 0.0)
 
     @field_validator("lever_arm")

@@ -6,19 +6,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from bentwing.base.run_record import finished_record, understood
 from bentwing.evaluate.surfels import Surfels, surfels_of_cloud
-from bentwing.map.gps_time import adjusted_gps_origin
-from bentwing.map.read import read_parts
-from bentwing.report.finished import map_of, trajectory_of
+from bentwing.report.finished import ShownRun
 from bentwing.report.view.levels import FINEST, Level, LevelPoints, coarser_levels
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
+    import numpy as np
     from numpy.typing import NDArray
 
     from bentwing.base.progress import Stage
@@ -64,31 +60,18 @@ def read_contents(folder: Path, most: int, shown: Stage) -> Contents:
     InputError
         If its trajectory or its map cannot be read.
     """
-    record = finished_record(folder)
-    with understood(folder):
-        # Of a merged map the path of the first run is shown.
-        first = (record.get("runs") or [record])[0]
-        trajectory, origin_ns = trajectory_of(
-            folder / first.get("trajectory", "trajectory.txt"), first
-        )
+    shown_run = ShownRun.open(folder)
     finest = Level(FINEST, most)
-    surfels = surfels_of_cloud(
-        _watched(map_of(folder), record, origin_ns, finest, shown), SURFEL_EDGE
-    )
+    surfels = surfels_of_cloud(_watched(shown_run, finest, shown), SURFEL_EDGE)
     levels = [finest.result, *coarser_levels(finest.result, _N_COARSER)]
-    return Contents(levels, surfels, trajectory, record.get("windows") or [])
+    windows = shown_run.run.record.get("windows") or []
+    return Contents(levels, surfels, shown_run.trajectory, windows)
 
 
-def _watched(
-    path: Path | None, record: dict[str, Any], origin_ns: int, level: Level, shown: Stage
-) -> Iterator[NDArray[np.float64]]:
+def _watched(run: ShownRun, level: Level, shown: Stage) -> Iterator[NDArray[np.float64]]:
     """Pass the points of a map on, adding them to a level."""
-    if path is None:
-        return
-    for part in read_parts(path, record.get("georeference")):
-        times = np.zeros(len(part.points)) if part.times is None else part.times
-        if path.suffix in {".laz", ".las"}:
-            times = times - adjusted_gps_origin(origin_ns)
-        level.add(part.points, times)
-        shown.advance(len(part.points))
-        yield part.points
+    run.run.require_one_map()
+    for points, times in run.parts() if run.run.map_path is not None else ():
+        level.add(points, times)
+        shown.advance(len(points))
+        yield points

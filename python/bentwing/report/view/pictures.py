@@ -13,7 +13,7 @@ from bentwing.base.trajectory import Trajectory
 from bentwing.map.epsg import epsg_of_map
 from bentwing.report.colours import HEIGHT as HEIGHTS
 from bentwing.report.colours import TIME
-from bentwing.report.finished import FinishedRun
+from bentwing.report.finished import ShownRun
 from bentwing.report.frame import ShownFrame
 from bentwing.report.geotiff import write_geotiff
 from bentwing.report.lettering import Lettering, lettered
@@ -64,13 +64,9 @@ def read_pictured(run: Path, most: int = _MOST) -> Pictured:
     InputError
         If it has no map, or its map or trajectory cannot be read.
     """
-    finished = FinishedRun.open(run)
-    if finished.map is None:
-        msg = (
-            f"{run}: the run has no map; run `bentwing map` again, to its end and without --no-map"
-        )
-        raise InputError(msg)
-    frame = ShownFrame.of(finished.record.get("georeference"))
+    finished = ShownRun.open(run)
+    path = finished.run.require_map()
+    frame = ShownFrame.of(finished.run.record.get("georeference"))
     level = Level(FINEST, most)
     origin = frame.origin if frame.origin.any() else None
     for places, times in finished.parts():
@@ -82,13 +78,13 @@ def read_pictured(run: Path, most: int = _MOST) -> Pictured:
         level.add(shown, times)
     points = level.result.points.astype(np.float64)
     if origin is None or not len(points):
-        msg = f"{finished.map}: holds no point; give a run with a map"
+        msg = f"{path}: holds no point; give a run with a map"
         raise InputError(msg)
     local = frame.trajectory(finished.trajectory)
     if _elsewhere(local.positions, points):
         local = Trajectory(np.empty(0), np.empty((0, 3)), np.empty((0, 4)))
     order = np.argsort(level.result.times, kind="stable")
-    epsg = epsg_of_map(finished.map)
+    epsg = epsg_of_map(path)
     return Pictured(points[order], level.result.times[order], local, origin, epsg)
 
 

@@ -9,18 +9,18 @@ from pathlib import Path
 from tempfile import gettempdir
 from typing import TYPE_CHECKING
 
-from bentwing.base.arguments import instance, thread_count
+from bentwing.base.arguments import thread_count
 from bentwing.base.errors import UsageError
+from bentwing.base.new_file import require_new
 from bentwing.base.progress import as_progress
-from bentwing.map.crop import Crop
 from bentwing.map.formats import FORMATS, MAP_FORMATS, require_format
 from bentwing.map.write_tiles import write_tiles
 from bentwing.map.writer import open_map
 from bentwing.recording.preprocess.read_ahead import read_ahead
 from bentwing.run.export.finished import Finished
 from bentwing.run.export.mcap_file import SPACING, SUFFIX, write_mcap
-from bentwing.run.export.points import Points, Wish
-from bentwing.run.export.trajectory_files import SUFFIXES, Named, format_of, write_trajectory
+from bentwing.run.export.points import ExportOptions, Points
+from bentwing.run.export.trajectory_files import SUFFIXES, format_of, write_trajectory
 
 if TYPE_CHECKING:
     from collections.abc import Generator
@@ -72,15 +72,8 @@ class Exported:
 def export(
     run: Run | Path | str,
     path: Path | str,
+    options: ExportOptions | None = None,
     *,
-    spacing: float | None = None,
-    crop: Crop | None = None,
-    polygon: Path | str | None = None,
-    keep_moving: bool | None = None,
-    keep_mixed: bool | None = None,
-    refine: bool | None = None,
-    epsg: int | None = None,
-    local: bool = False,
     tiles: int | None = None,
     map_format: MapFormat | None = None,
     trajectory_format: TrajectoryFormat | None = None,
@@ -89,22 +82,15 @@ def export(
 ) -> Exported:
     """Write a finished run's map, or its trajectory, in another form, without estimating again.
 
-    The points come from the map in the run folder. Where that does not have what is wished, they are read from
-    the recording once more.
+    The points come from the map in the run folder. Where that does not have what is asked for, they are read
+    from the recording once more.
 
     Parameters
     ----------
     run : folder of a run, a localized run or a merged map
     path : of the file, which must not exist; its suffix says the format. With `tiles`, a folder of that
         name without the suffix. `.mcap` has trajectory and map as messages of ROS 2
-    spacing : m, edge of the voxels that keep one point each; 0 for all points; default: those of the map
-    crop : what is kept; default: all
-    polygon : GeoJSON or DXF file with areas, inside of which points are kept
-    keep_moving : keep points that beams went through at other times; default: as the map does
-    keep_mixed : keep returns between two surfaces; default: as the map does
-    refine : move points along their beams to the surface that they measured together; default: as the map
-    epsg : projected system of the coordinates; default: that of the map
-    local : write coordinates in the frame of the trajectory
+    options : which points, and in which coordinates; default: those of the map
     tiles : m, edge of square tiles, a file each; default: one file
     map_format : one of `MAP_FORMATS`; default: what the suffix says
     trajectory_format : one of `tum`, `kitti`, `euroc`, `kml`, `geojson`; default: what the suffix says
@@ -114,32 +100,32 @@ def export(
     Raises
     ------
     UsageError
-        If the run is not complete, or the wish cannot be met or leaves nothing.
+        If the run is not complete, or what is asked for cannot be had or is nothing.
     InputError
         If a file of the run has changed, or the recording is to be read again and is gone or has changed.
     """
     out, shown = Path(path), as_progress(progress)
     thread_count(threads)
-    wish = Wish(spacing, _crop(crop), _path(polygon), keep_moving, keep_mixed, refine, epsg, local)
+    options = options or ExportOptions()
     kind = None if map_format is not None else format_of(out, trajectory_format)
     if trajectory_format is not None and map_format is not None:
         msg = f"a trajectory ({trajectory_format}) and a map ({map_format}) are two files; export twice"
         raise UsageError(msg)
     if kind is None and map_format is None and out.suffix.lower() == SUFFIX:
-        return _export_messages(run, out, wish, tiles, threads=threads, progress=shown)
+        return _export_messages(run, out, options, tiles, threads=threads, progress=shown)
     if kind is not None:
-        if wish != Wish() or tiles is not None:
+        if options != ExportOptions() or tiles is not None:
             msg = f"{out}: is a trajectory, of which spacing, crop, coordinates and tiles cannot be chosen"
             raise UsageError(msg)
         return _export_trajectory(Finished.open(run), out, kind)
     wanted = require_format(map_format) if map_format is not None else _map_format_of(out)
     target = out if tiles is None else _without_suffix(out, wanted)
-    _require_new(target)
+    require_new(target)
     if tiles is not None and (tiles != int(tiles) or tiles < 1):
         msg = f"tiles of {tiles} m cannot be written; give whole metres"
         raise UsageError(msg)
     finished = Finished.open(run)
-    points = Points.of(finished, wish)
+    points = Points.of(finished, options)
     shown.note(f"export: {points.origin}")
     counts: dict[str, int] = {}
     chunks = _some(points.chunks(target.parent, threads=threads, progress=shown, counts=counts))
@@ -149,14 +135,14 @@ def export(
             target,
             int(tiles),
             map_format=wanted,
-            clock_origin_ns=finished.origin_ns,
+            clock_origin_ns=finished.run.start_ns,
             system=points.target.system,
             progress=shown,
         )
     else:
         with (
             closing(chunks),
-            open_map(target, wanted, finished.origin_ns, points.target.crs_wkt) as writer,
+            open_map(target, wanted, finished.run.start_ns, points.target.crs_wkt) as writer,
         ):
             writer.progress = shown
             for chunk in chunks:
@@ -167,15 +153,8 @@ def export(
 
 def export_points(
     run: Run | Path | str,
+    options: ExportOptions | None = None,
     *,
-    spacing: float | None = None,
-    crop: Crop | None = None,
-    polygon: Path | str | None = None,
-    keep_moving: bool | None = None,
-    keep_mixed: bool | None = None,
-    refine: bool | None = None,
-    epsg: int | None = None,
-    local: bool = False,
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> Generator[MapChunk, None, None]:
@@ -187,27 +166,26 @@ def export_points(
         At once, as `export`; an empty result is no error.
     """
     thread_count(threads)
-    wish = Wish(spacing, _crop(crop), _path(polygon), keep_moving, keep_mixed, refine, epsg, local)
-    points = Points.of(Finished.open(run), wish)
+    points = Points.of(Finished.open(run), options or ExportOptions())
     return points.chunks(Path(gettempdir()), threads=threads, progress=progress)
 
 
 def _export_messages(
     run: Run | Path | str,
     out: Path,
-    wish: Wish,
+    options: ExportOptions,
     tiles: int | None,
     *,
     threads: int | None,
     progress: Progress,
 ) -> Exported:
-    if wish.epsg is not None or tiles is not None:
+    if options.epsg is not None or tiles is not None:
         msg = f"{out}: messages are in the frame of the trajectory and in one file; leave --epsg and --tiles out"
         raise UsageError(msg)
-    _require_new(out)
+    require_new(out)
     finished = Finished.open(run)
-    spacing = max(SPACING, finished.spacing) if wish.spacing is None else wish.spacing
-    points = Points.of(finished, replace(wish, spacing=spacing, local=True))
+    spacing = max(SPACING, finished.spacing) if options.spacing is None else options.spacing
+    points = Points.of(finished, replace(options, spacing=spacing, local=True))
     progress.note(f"export: {points.origin}")
     counts: dict[str, int] = {}
     chunks = points.chunks(out.parent, threads=threads, progress=progress, counts=counts)
@@ -216,23 +194,14 @@ def _export_messages(
 
 
 def _export_trajectory(run: Finished, out: Path, kind: TrajectoryFormat) -> Exported:
-    named = [Named(name, poses, run.start_ns[name]) for name, poses in run.trajectories.items()]
     paths = [out]
-    if len(named) > 1:
-        paths = [out.with_name(f"{out.stem}_{one.name}{out.suffix}") for one in named]
+    if len(run.flights) > 1:
+        paths = [out.with_name(f"{out.stem}_{one.name}{out.suffix}") for one in run.flights]
     for path in paths:
-        _require_new(path)
-    for path, one in zip(paths, named, strict=True):
+        require_new(path)
+    for path, one in zip(paths, run.flights, strict=True):
         write_trajectory(path, kind, one, run.coordinates)
     return Exported(tuple(paths))
-
-
-def _crop(crop: Crop | None) -> Crop:
-    return Crop() if crop is None else instance("crop", crop, Crop, "give bentwing.map.Crop(...)")
-
-
-def _path(path: Path | str | None) -> Path | None:
-    return None if path is None else Path(path)
 
 
 def _map_format_of(path: Path) -> MapFormat:
@@ -254,15 +223,6 @@ def _without_suffix(path: Path, map_format: str) -> Path:
     if name.lower().endswith(f".{map_format}"):
         name = name[: -len(map_format) - 1]
     return path.with_name(name)
-
-
-def _require_new(path: Path) -> None:
-    if path.exists():
-        msg = f"{path}: exists already; name another, or move this one away"
-        raise UsageError(msg)
-    if not path.parent.is_dir():
-        msg = f"{path}: there is no folder {path.parent}; make it, or name a place elsewhere"
-        raise UsageError(msg)
 
 
 def _some(chunks: Generator[MapChunk, None, None]) -> Generator[MapChunk, None, None]:

@@ -136,7 +136,9 @@ def _moving(messages: RosMessages, one: _Poses) -> Iterator[_Sent]:
 def _clouds(messages: RosMessages, run: Finished, chunks: Iterable[MapChunk]) -> Iterator[_Sent]:
     """Yield the points of each keyframe when all of them are measured."""
     for parts in _keyframes(chunks):
-        stamp_ns = run.origin_ns + round(max(float(part.times.max()) for part in parts) * NS_PER_S)
+        stamp_ns = run.run.start_ns + round(
+            max(float(part.times.max()) for part in parts) * NS_PER_S
+        )
         points = np.concatenate([part.points for part in parts])
         strengths = [part.intensity for part in parts if part.intensity is not None]
         intensity = np.concatenate(strengths) if len(strengths) == len(parts) else None
@@ -145,11 +147,11 @@ def _clouds(messages: RosMessages, run: Finished, chunks: Iterable[MapChunk]) ->
 
 def _poses_of(run: Finished) -> list[_Poses]:
     found = []
-    for name, poses in run.trajectories.items():
-        shown = poses[every(poses.times, POSE_STEP)]
-        stamps_ns = Clock(run.start_ns[name]).to_ns(shown.times)
-        called = "" if len(run.trajectories) == 1 else re.sub(r"[^A-Za-z0-9]", "_", name)
-        found.append(_Poses(shown, stamps_ns, run.covariances[name], called))
+    for flight in run.flights:
+        shown = flight.trajectory[every(flight.trajectory.times, POSE_STEP)]
+        stamps_ns = Clock(flight.start_ns).to_ns(shown.times)
+        name = "" if len(run.flights) == 1 else re.sub(r"[^A-Za-z0-9]", "_", flight.name)
+        found.append(_Poses(shown, stamps_ns, run.covariances, name))
     return found
 
 

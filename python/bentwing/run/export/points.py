@@ -5,10 +5,12 @@ from __future__ import annotations
 
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bentwing.base.arguments import instance
 from bentwing.base.errors import BentwingError, UsageError
 from bentwing.base.progress import as_progress
 from bentwing.map.clean import clean
@@ -22,7 +24,6 @@ from bentwing.run.settings import SMALLEST_SPACING
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterator
-    from pathlib import Path
 
     from bentwing.base.progress import Progress
     from bentwing.map.chunk import MapChunk
@@ -34,23 +35,25 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Wish:
-    """What an export has.
+class ExportOptions:
+    """The points that an export has, and their coordinates.
 
     Attributes
     ----------
     spacing : m, edge of the voxels that keep one point each; 0 for all points; None for those of the map
     crop : what is kept, in the coordinates of the export
-    keep_moving, keep_mixed : whether such points are kept; None for what the map does
-    refine : whether points are moved to the surface that they measured together; None for what the map does
-    polygon : file of areas, inside of which points are kept beside what the crop says
-    epsg : projected system; None for the coordinates of the map
+    polygon : GeoJSON or DXF file of areas, inside of which points are kept beside what the crop says
+    keep_moving : whether points are kept that beams went through at other times; None for what the map does
+    keep_mixed : whether returns between two surfaces are kept; None for what the map does
+    refine : whether points are moved along their beams to the surface that they measured together; None for
+        what the map does
+    epsg : projected system; None for that of the map
     local : whether coordinates are in the frame of the trajectory
     """
 
     spacing: float | None = None
     crop: Crop = field(default_factory=Crop)
-    polygon: Path | None = None
+    polygon: Path | str | None = None
     keep_moving: bool | None = None
     keep_mixed: bool | None = None
     refine: bool | None = None
@@ -58,6 +61,7 @@ class Wish:
     local: bool = False
 
     def __post_init__(self) -> None:
+        instance("crop", self.crop, Crop, "give bentwing.map.Crop(...)")
         spacing = self.spacing
         if spacing is not None and spacing != 0 and not spacing >= SMALLEST_SPACING:
             msg = (
@@ -92,38 +96,38 @@ class Points:
 
     origin: str
     target: Target
-    _wish: Wish
+    _options: ExportOptions
     _run: Finished
     _source: MapFile | list[Source]
 
     @classmethod
-    def of(cls, run: Finished, wish: Wish) -> Points:
+    def of(cls, run: Finished, options: ExportOptions) -> Points:
         """Decide where the points come from, and refuse what cannot be done before any work.
 
         Raises
         ------
         UsageError
-            If the wish cannot be met, or leaves nothing.
+            If what is asked for cannot be met, or leaves nothing.
         InputError
             If the recording has to be read again, and is gone or has changed.
         """
-        target = run.coordinates.target(epsg=wish.epsg, local=wish.local)
-        if wish.polygon is not None:
-            area = area_in(target, wish.polygon)
-            wish = replace(wish, crop=replace(wish.crop, area=area), polygon=None)
+        target = run.coordinates.target(epsg=options.epsg, local=options.local)
+        if options.polygon is not None:
+            area = area_in(target, Path(options.polygon))
+            options = replace(options, crop=replace(options.crop, area=area), polygon=None)
         stored = run.map_file()
-        reason = _why_again(run, wish, stored)
+        reason = _why_again(run, options, stored)
         if reason is None and stored is not None:
-            _require_some(run, wish, target, stored)
+            _require_some(run, options, target, stored)
             origin = f"from {stored.path.name}, {stored.n_points:,} points"
-            return cls(origin, target, wish, run, stored)
-        _require_some(run, wish, target, None)
+            return cls(origin, target, options, run, stored)
+        _require_some(run, options, target, None)
         try:
             sources = run.sources()
         except BentwingError as error:
-            msg = f"{run.folder}: {reason}, so the recording has to be read again: {error}"
+            msg = f"{run.run.folder}: {reason}, so the recording has to be read again: {error}"
             raise type(error)(msg) from error
-        return cls(f"from the recording, as {reason}", target, wish, run, sources)
+        return cls(f"from the recording, as {reason}", target, options, run, sources)
 
     def chunks(
         self,
@@ -133,7 +137,7 @@ class Points:
         progress: Progress | None = None,
         counts: dict[str, int] | None = None,
     ) -> Generator[MapChunk, None, None]:
-        """Yield the points as they are wished.
+        """Yield the points that are asked for.
 
         Parameters
         ----------
@@ -141,9 +145,9 @@ class Points:
         counts : receives what was left out
         """
         counts = {} if counts is None else counts
-        wish = self._wish
+        options = self._options
         # Distances are those of the ground, which a projection stretches.
-        near, rest = Crop(within=wish.crop.within), replace(wish.crop, within=None)
+        near, rest = Crop(within=options.crop.within), replace(options.crop, within=None)
         with self._read(folder, threads, as_progress(progress), counts) as (read, change, to_path):
             if near:
                 read = Cropper(near, self._run.path, to_path).chunks(read, counts)
@@ -158,7 +162,7 @@ class Points:
         Its coordinates are rounded, and two points next to a border would share a voxel then.
         """
         own = self._run.spacing
-        wanted = own if self._wish.spacing is None else self._wish.spacing
+        wanted = own if self._options.spacing is None else self._options.spacing
         return 0.0 if wanted == own and not isinstance(self._source, list) else wanted
 
     @contextmanager
@@ -167,38 +171,42 @@ class Points:
     ) -> Iterator[tuple[Generator[MapChunk, None, None], Change, Change]]:
         """Open the source: its points, the way to the export's coordinates and to the path's frame."""
         if isinstance(self._source, list):
-            chunks = _again(self._run, self._wish, self._source, folder, threads, progress, counts)
+            chunks = _again(
+                self._run, self._options, self._source, folder, threads, progress, counts
+            )
             yield chunks, self.target.from_local, same
             return
         stored = self._source
         with progress.stage("export", stored.n_points, "points") as shown:
-            read = _shown(stored.chunks(self._run.origin_ns), shown.advance)
+            read = _shown(stored.chunks(self._run.run.start_ns), shown.advance)
             yield read, self.target.from_map, self._run.coordinates.nearly_local
 
 
-def _why_again(run: Finished, wish: Wish, stored: MapFile | None) -> str | None:
-    """Return why the map does not have what is wished; None if it has."""
+def _why_again(run: Finished, options: ExportOptions, stored: MapFile | None) -> str | None:
+    """Return why the map does not have what is asked for; None if it has."""
     if run.map_name is None:
         return "the run was made without a map"
     if stored is None:
         return f"{run.map_name} is not there, or does not keep all that is known of its points"
-    if wish.spacing is not None and wish.spacing < run.spacing:
+    if options.spacing is not None and options.spacing < run.spacing:
         return f"its map has one point in {run.spacing:g} m only"
-    if wish.cleaning(run.cleaning) != run.cleaning:
+    if options.cleaning(run.cleaning) != run.cleaning:
         return "its map was cleaned otherwise"
-    if wish.refines(run) != run.refines:
+    if options.refines(run) != run.refines:
         return f"its map is {'' if run.refines else 'not '}refined"
     return None
 
 
-def _require_some(run: Finished, wish: Wish, target: Target, stored: MapFile | None) -> None:
+def _require_some(
+    run: Finished, options: ExportOptions, target: Target, stored: MapFile | None
+) -> None:
     """Refuse a crop that leaves nothing, as far as that can be seen from outside.
 
     Raises
     ------
     UsageError
     """
-    times, span = wish.crop.times, run.span
+    times, span = options.crop.times, run.span
     if times is not None and (times[1] < span[0] or times[0] > span[1]):
         msg = (
             f"no point was measured from {times[0]:g} to {times[1]:g} s: the run has {span[0]:.1f} to "
@@ -210,7 +218,7 @@ def _require_some(run: Finished, wish: Wish, target: Target, stored: MapFile | N
     corners = np.stack([stored.low, stored.high])
     grid = np.stack(np.meshgrid(*corners.T, indexing="ij"), axis=-1).reshape(-1, 3)
     box = target.from_map(grid)
-    low, high = wish.crop.bounds
+    low, high = options.crop.bounds
     if (low > box.max(axis=0) + 1.0).any() or (high < box.min(axis=0) - 1.0).any():
         msg = (
             f"nothing of the map is inside: it reaches from {_written(box.min(axis=0))} to "
@@ -225,7 +233,7 @@ def _written(corner: np.ndarray) -> str:
 
 def _again(  # noqa: PLR0917 - private, called once
     run: Finished,
-    wish: Wish,
+    options: ExportOptions,
     sources: list[Source],
     folder: Path,
     threads: int | None,
@@ -239,11 +247,11 @@ def _again(  # noqa: PLR0917 - private, called once
         in_turn(points, counts),
         folder,
         duration=_duration(sources),
-        settings=wish.cleaning(run.cleaning),
+        settings=options.cleaning(run.cleaning),
         counts=counts,
         threads=threads,
     )
-    if wish.refines(run):
+    if options.refines(run):
         cleaned = refine(cleaned, folder, counts=counts, threads=threads)
     for chunk in cleaned:
         yield with_own_times(chunk, late)

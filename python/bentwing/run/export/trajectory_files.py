@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import json
 from datetime import datetime, timedelta, timezone
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 from xml.sax.saxutils import escape
 
 import numpy as np
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bentwing.base.trajectory import Trajectory
+    from bentwing.map.finished_run import Flight
     from bentwing.run.export.coordinates import Coordinates
 
 SUFFIXES: dict[str, TrajectoryFormat] = {
@@ -34,16 +35,8 @@ _EUROC = (
 )
 
 
-class Named(NamedTuple):
-    """The trajectory of a run; `start_ns` is its time zero, ns UTC."""
-
-    name: str
-    poses: Trajectory
-    start_ns: int
-
-
 def write_trajectory(
-    path: Path, kind: TrajectoryFormat, run: Named, coordinates: Coordinates
+    path: Path, kind: TrajectoryFormat, flight: Flight, coordinates: Coordinates
 ) -> None:
     """Write the poses of the IMU; on the Earth for `kml` and `geojson`, else in the frame of the trajectory.
 
@@ -52,7 +45,7 @@ def write_trajectory(
     UsageError
         If nothing says where on the Earth the run is.
     """
-    poses, start_ns = run.poses, run.start_ns
+    poses, start_ns = flight.trajectory, flight.start_ns
     if kind == "tum":
         poses.write_tum(path, start_ns)
     elif kind == "kitti":
@@ -64,7 +57,7 @@ def write_trajectory(
         places = coordinates.degrees(shown.positions)
         stamps = [_iso(int(stamp)) for stamp in Clock(start_ns).to_ns(shown.times)]
         write = _kml if kind == "kml" else _geojson
-        write_text(path, write(run.name, places, stamps))
+        write_text(path, write(flight.name, places, stamps))
 
 
 def format_of(path: Path, wanted: str | None) -> TrajectoryFormat | None:

@@ -10,8 +10,8 @@ from bentwing.base.errors import NotEnoughDataError
 from bentwing.base.trajectory import Trajectory
 from bentwing.closing.georeference.georeference import georeference
 from bentwing.closing.georeference.receivers import Receivers
+from bentwing.run.gnss import receivers_of
 from bentwing.run.mapping import follow_each_other, in_turn, joined_trajectory
-from bentwing.run.stages import receivers_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -95,7 +95,7 @@ def place_on_earth(
 
 def _receivers(source: Source) -> Receivers | None:
     with source.part() as part:
-        return receivers_of(part, source.name)
+        return receivers_of(part, source.georeferencing, source.name)
 
 
 def _taken_apart(bent: Trajectory, estimates: Sequence[Estimate]) -> list[Estimate]:

@@ -104,7 +104,10 @@ def merge(
     wanted = settings_of_runs(settings.georeferencing, sources)
     named = settings.project or next((s.project for s in sources if s.project is not None), None)
     settings = settings.model_copy(update={"georeferencing": wanted, "project": named})
-    is_placed = any(source.payload.gnss is not None for source in sources)
+    is_placed = any(
+        source.payload.gnss is not None or source.georeferencing.fixes is not None
+        for source in sources
+    )
     require_effect(wanted, "these runs", is_placed=is_placed)
     if any(resolved(Path(out)) == resolved(source.folder) for source in sources):
         msg = (

@@ -53,25 +53,25 @@ def in_box(points, margin=0.02):
 
 def test_nothing_changes_where_nothing_has():
     found = compared(seen(box=True, seed=1, noise=0.01), seen(box=True, seed=2, noise=0.01))
-    assert len(found.appeared) == len(found.disappeared) == 0
+    assert len(found.change.appeared) == len(found.change.disappeared) == 0
     assert found.record["points"] == SECONDS * RATE
 
 
 @pytest.mark.parametrize("origins", [True, False])
 def test_a_new_box_appears(origins):
     found = compared(seen(box=False, seed=1), seen(box=True, seed=2), origins=origins)
-    assert in_box(found.appeared).all()
+    assert in_box(found.change.appeared).all()
     # three of its sides, in voxels of 5 cm, but for what is near the floor
-    assert len(found.appeared) > 500
-    assert len(found.disappeared) == 0
+    assert len(found.change.appeared) > 500
+    assert len(found.change.disappeared) == 0
 
 
 def test_a_box_that_was_taken_away_has_disappeared():
     found = compared(seen(box=True, seed=1), seen(box=False, seed=2))
-    assert in_box(found.disappeared).all()
-    assert len(found.disappeared) > 100
+    assert in_box(found.change.disappeared).all()
+    assert len(found.change.disappeared) > 100
     # behind it is floor and wall that the map never saw, and nobody knows whether it was there
-    assert len(found.appeared) == 0
+    assert len(found.change.appeared) == 0
     assert found.n_beyond > 1000
 
 
@@ -79,4 +79,4 @@ def test_what_stands_alone_is_not_believed():
     after = seen(box=False, seed=2)
     after[::25_000] *= 0.5  # 24 errors of the sensor in the middle of the room
     found = compared(seen(box=False, seed=1), after)
-    assert len(found.appeared) == 0
+    assert len(found.change.appeared) == 0

@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from bentwing.base.progress import Progress
     from bentwing.base.trajectory import Trajectory, read_tum
     from bentwing.base.window_record import WindowRecord
+    from bentwing.fleet.site import Site, map_fleet
     from bentwing.flight.live.odometry import Odometry
     from bentwing.odometry.window import register_window
     from bentwing.odometry.window_result import WindowResult
@@ -77,6 +78,7 @@ else:
             "base.progress": ["Progress"],
             "base.trajectory": ["Trajectory", "read_tum"],
             "base.window_record": ["WindowRecord"],
+            "fleet.site": ["Site", "map_fleet"],
             "flight.live.odometry": ["Odometry"],
             "odometry.window": ["register_window"],
             "odometry.window_result": ["WindowResult"],
@@ -137,6 +139,7 @@ __all__ = [
     "RecordingError",
     "Run",
     "SingularSystemError",
+    "Site",
     "Trajectory",
     "UsageError",
     "WindowRecord",
@@ -144,6 +147,7 @@ __all__ = [
     "__version__",
     "export",
     "export_points",
+    "map_fleet",
     "map_recording",
     "merge",
     "read_tum",

@@ -17,13 +17,13 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
     from pathlib import Path
 
-    from bentwing.run.settings import RunSettings
+    from bentwing.run.settings import MapSettings, RunSettings
 
 # The number of threads and names in the report change no bit of a trajectory or a map.
 _FREE = frozenset({"threads", "project"})
 
 
-def deciding(settings: RunSettings) -> dict[str, Any]:
+def deciding(settings: MapSettings) -> dict[str, Any]:
     """Return the settings that decide the bytes of a result, in plain JSON types."""
     return {name: value for name, value in settings.to_json().items() if name not in _FREE}
 
@@ -57,17 +57,21 @@ def inputs_of(paths: Iterable[Path]) -> list[dict[str, Any]]:
     return [describe_input(file) for path in paths for file in files_of(path)]
 
 
-def record_of_request(run: Path, request: str, recordings: Sequence[Path]) -> dict[str, Any] | None:
+def record_of_request(
+    run: Path, request: str, recordings: Sequence[Path] | None
+) -> dict[str, Any] | None:
     """Return the record of the complete run in a folder, None unless it is of this request.
 
     Parameters
     ----------
-    recordings : the files of the recording, which a merging reads again where the run found them
+    recordings : the files of the recording, which a merging reads again where the run found them; None
+        for a merged map, which has those of its runs
     """
     try:
         record = finished_record(run)
     except BentwingError:  # no run, an unfinished one, or one with other files than it wrote
         return None
-    is_same = record.get("request") == request
-    is_there = record.get("recordings") == [str(resolved(path)) for path in recordings]
-    return record if is_same and is_there else None
+    if record.get("request") != request:
+        return None
+    where = None if recordings is None else [str(resolved(path)) for path in recordings]
+    return record if where is None or record.get("recordings") == where else None

@@ -123,6 +123,8 @@ def make_map(
     found: Ingredients,
     described: dict[str, Any],
     settings: dict[str, Any],
+    *,
+    request: str | None = None,
 ) -> MergedMap:
     """Make the map of one group, in a folder of its own.
 
@@ -130,8 +132,10 @@ def make_map(
     ----------
     described : what `describe_map` says
     settings : in plain JSON types, for run.json
+    request : SHA-256 of what was asked, by which the map can be told again
     """
     with RunFolder(out, settings) as folder:
+        folder.record.request = request
         sources = [found.sources[n] for n in _numbers(group)]
         folder.add_inputs([path for source in sources for path in source.recordings])
         return _one_map(folder, group, found, described)

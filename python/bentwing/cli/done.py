@@ -61,25 +61,30 @@ def say_site(site: Site, *, quiet: bool) -> None:
     if not quiet:
         wide = max(len(one.name) for one in site.recordings)
         for one in site.recordings:
-            said = sentence_of(one.state, one.reason) + (" (as before)" if one.is_earlier else "")
-            typer.echo(f"{one.name:<{wide}}  {said}")
+            state = sentence_of(one.state, one.reason)
+            typer.echo(f"{one.name:<{wide}}  {state}{' (as before)' if one.is_earlier else ''}")
         for group in site.groups or []:
             alone = len(group.runs) == 1
-            said = "belongs to no other" if alone else sentence_of(group.state, group.reason)
-            typer.echo(f"{group.folder}: {', '.join(group.runs)}; {said}")
+            state = "belongs to no other" if alone else sentence_of(group.state, group.reason)
+            typer.echo(f"{group.folder}: {', '.join(group.runs)}; {state}")
         typer.echo(f"{site.out}: {_counted(site)}; open {site.out / 'index.html'}")
     if site.is_complete:
         return
     bad = [one for one in site.recordings if not one.is_usable]
-    maps = [one for one in site.groups or [] if one.state == "failed" and len(one.runs) > 1]
-    msg = "; ".join(
-        [
-            *(f"{one.name}: {sentence_of(one.state, one.reason)}" for one in bad[:1]),
-            *([f"and {len(bad) - 1} more recordings are not mapped"] if len(bad) > 1 else []),
-            *([f"the runs were not merged: {site.failure}"] if site.failure else []),
-            *(f"{one.folder}: {sentence_of(one.state, one.reason)}" for one in maps[:1]),
-        ]
-    )
+    wrong = [one for one in site.groups or [] if one.state == "failed" and len(one.runs) > 1]
+    said = [
+        f"{one.name} ({sentence_of(one.state, one.reason)})" if quiet else one.name for one in bad
+    ]
+    problems = [
+        *(
+            [f"{len(bad)} of {len(site.recordings)} are not mapped: {', '.join(said)}"]
+            if bad
+            else []
+        ),
+        *([f"the runs were not merged: {site.failure}"] if site.failure else []),
+        *(f"{one.folder}: {sentence_of(one.state, one.reason)}" for one in wrong),
+    ]
+    msg = f"{'; '.join(problems)}; open {site.out / 'index.html'}"
     if len(bad) < len(site.recordings):
         raise PartialError(msg)
     raise (EstimationError if any(one.state == "failed" for one in bad) else InputError)(msg)

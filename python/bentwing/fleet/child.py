@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""What runs in the process of one piece of work: `python -m bentwing.fleet.child`."""
+"""What runs in the process of one piece of work."""
 
 from __future__ import annotations
 
@@ -89,7 +89,3 @@ def _end_with_parent() -> None:
     """End this process at once when its parent's end of the pipe closes; a checkpoint is kept."""
     os.read(0, 1)
     os._exit(1)
-
-
-if __name__ == "__main__":
-    main()

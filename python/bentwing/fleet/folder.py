@@ -26,6 +26,7 @@ SITE_FOLDER = RecordedFolder(SITE_RECORD, "bentwing site", "site")
 PAGE = "index.html"
 RECORDINGS, GROUPS = "recordings", "groups"
 _SHOWN = 16  # digits of a request in a name
+_OTHER = "{place}: holds something else than a run; move it away, or choose another folder"
 # What tells nothing of the recording: times, and what is drawn with them.
 _OF_THE_RUN = frozenset({"report.html"})
 
@@ -34,6 +35,17 @@ def staging_of(place: Path, request: str) -> Path:
     """Return where a result is made before it has its name."""
     host = re.sub(r"[^\w-]", "-", platform.node())
     return place.with_name(f".{place.name}.{request[:_SHOWN]}.{host}{TEMPORARY_SUFFIX}")
+
+
+def require_run_or_nothing(place: Path) -> None:
+    """Refuse a place that holds something else, which a result would have to replace.
+
+    Raises
+    ------
+    UsageError
+    """
+    if place.exists() and RUN_FOLDER.read(place) is None:
+        raise UsageError(_OTHER.format(place=place))
 
 
 def publish(staging: Path, place: Path) -> None:
@@ -52,16 +64,20 @@ def publish(staging: Path, place: Path) -> None:
     if made.get("complete") and earlier.get("complete") and _is_same(made, earlier):
         RUN_FOLDER.remove(staging)
     else:
-        if place.exists():
-            RUN_FOLDER.remove(place)
-        if place.exists():
-            msg = (
-                f"{place}: holds something else than a run; move it away, or choose another folder"
-            )
-            raise UsageError(msg)
+        require_run_or_nothing(place)
+        RUN_FOLDER.remove(place)
+        if place.exists():  # beside the run there is something else
+            raise UsageError(_OTHER.format(place=place))
         staging.replace(place)
-    for left in place.parent.glob(f".{place.name}.*{TEMPORARY_SUFFIX}"):
-        shutil.rmtree(left, ignore_errors=True)
+    for left in place.parent.iterdir():
+        if _name_in(left.name) == place.name:
+            shutil.rmtree(left, ignore_errors=True)
+
+
+def _name_in(staging: str) -> str | None:
+    """Return the name of the result that is made in a folder of this name, None if it is none."""
+    words = staging.removesuffix(TEMPORARY_SUFFIX).rsplit(".", 2)
+    return words[0][1:] if staging.endswith(TEMPORARY_SUFFIX) and len(words) == 3 else None
 
 
 def _is_same(made: dict[str, Any], earlier: dict[str, Any]) -> bool:

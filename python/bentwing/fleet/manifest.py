@@ -55,7 +55,7 @@ class Row(Known):
     @field_validator("name")
     @classmethod
     def _can_be_a_folder(cls, name: str) -> str:
-        if not is_plain_name(name) or name.startswith(".") or not name.isprintable():
+        if not name or not is_plain_name(name) or name.startswith(".") or not name.isprintable():
             msg = f"{name!r} cannot be the name of a folder; give letters, digits, - and _"
             raise ValueError(msg)
         if len(name) > _LONGEST_NAME:

@@ -22,7 +22,8 @@ from bentwing.base.plain import plain
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-_MODULE = "bentwing.fleet.child"
+# The same modules as here, and not those that happen to lie where the command was started.
+_START = "import sys; sys.path[:] = {path!r}; from bentwing.fleet.child import main; main()"
 _BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 _KILLED = -9
 
@@ -91,7 +92,7 @@ def _run(order: str, name: str, processes: Processes | None) -> tuple[int, str]:
     """Return the exit code and the last line that was said."""
     environment = {**dict.fromkeys(_BLAS_THREADS, "1"), **os.environ}
     with subprocess.Popen(
-        [sys.executable, "-m", _MODULE],
+        [sys.executable, "-c", _START.format(path=sys.path)],
         stdin=subprocess.PIPE,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,

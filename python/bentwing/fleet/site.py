@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from bentwing.base.errors import BentwingError
 from bentwing.base.progress import Progress, as_progress
 from bentwing.base.regular_file import resolved
 from bentwing.base.result_folder import ResultFolder
@@ -254,8 +253,8 @@ def _of_result(task: MapTask, result: Mapped | BaseException) -> Mapped:
         return result
     if not isinstance(result, Exception):
         raise result
-    state = "refused" if isinstance(result, BentwingError) else "failed"
-    return Mapped(task.name, state, str(result) or type(result).__name__, request=task.request)  # type: ignore[arg-type]
+    reason = str(result) or type(result).__name__
+    return Mapped(task.name, "failed", reason, request=task.request)
 
 
 def _merged(site: Site, choice: Choice, pool: _Lazy) -> Site:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from bentwing.base.errors import BentwingError, UsageError
 from bentwing.base.provenance import bentwing_version
 from bentwing.base.run_record import RUN_FOLDER, understood
-from bentwing.fleet.folder import publish, staging_of
+from bentwing.fleet.folder import publish, require_run_or_nothing, staging_of
 from bentwing.fleet.memory import megabytes_of
 from bentwing.fleet.process import Processes, run_process
 from bentwing.recording.sections.project import Project
@@ -197,12 +197,17 @@ def map_recording_of(
     ProcessDiedError
         If it ended without an answer: it may be worth another try.
     """
+    try:
+        return finished(task) or _made(task, threads, processes)
+    except BentwingError as error:
+        return Mapped(task.name, "refused", str(error), request=task.request)
+
+
+def _made(task: MapTask, threads: int | None, processes: Processes | None) -> Mapped:
     if task.version != bentwing_version():
         msg = f"this worker has bentwing {bentwing_version()}, the client has {task.version}; install the same"
         raise UsageError(msg)
-    done = finished(task)
-    if done is not None:
-        return done
+    require_run_or_nothing(task.place)
     staging = staging_of(task.place, task.request)
     order = {
         "recordings": task.recordings, "payload": task.payload, "settings": task.settings,
@@ -211,10 +216,11 @@ def map_recording_of(
     answer = run_process("map", order, task.name, processes)
     if RUN_FOLDER.read(staging) is not None:
         publish(staging, task.place)
-    for state in ("failed", "refused"):
-        if state in answer:
-            folder = task.place if RUN_FOLDER.read(task.place) is not None else None
-            return Mapped(task.name, state, answer[state], folder, task.request)
+    folder = task.place if RUN_FOLDER.read(task.place) is not None else None
+    if "failed" in answer:
+        return Mapped(task.name, "failed", answer["failed"], folder, task.request)
+    if "refused" in answer:
+        return Mapped(task.name, "refused", answer["refused"], folder, task.request)
     return _mapped(task, RUN_FOLDER.read(task.place) or {})
 
 

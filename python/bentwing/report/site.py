@@ -37,7 +37,7 @@ def write_site_page(path: Path, record: Mapping[str, Any]) -> None:
             ("", "recording", "state", "recorded", "points"),
             [_recording(one, path.parent) for one in recordings],
         ),
-        merging_section(record.get("places")),
+        _places(record),
     ]
     style = files("bentwing.report").joinpath("style.css").read_text(encoding="utf-8")
     page = (
@@ -91,6 +91,13 @@ def _maps(groups: Sequence[Mapping[str, Any]]) -> str:
     return "<h2>Maps</h2>" + _table(("", "recordings", "state", "places that join them"), rows)
 
 
+def _places(record: Mapping[str, Any]) -> str:
+    """Show what the merging compared, the groups in front."""
+    if not record["places"]:
+        return ""
+    return merging_section({**record["places"], "maps": record["groups"]})
+
+
 def _recording(one: Mapping[str, Any], site: Path) -> tuple[str, ...]:
     folder = one["folder"]
     has_report = folder is not None and (site / folder / "report.html").exists()
@@ -125,5 +132,10 @@ def _picture(folder: str, name: str) -> str:
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """Make a table of cells that are HTML already."""
     titles = "".join(f"<th>{escape(title)}</th>" for title in head)
-    body = "".join(f"<tr>{''.join(f'<td>{cell}</td>' for cell in row)}</tr>" for row in rows)
+    body = "".join(f"<tr>{''.join(map(_cell, row))}</tr>" for row in rows)
     return f'<div class="scroll"><table><thead><tr>{titles}</tr></thead><tbody>{body}</tbody></table></div>'
+
+
+def _cell(html: str) -> str:
+    kind = ' class="picture"' if "<img" in html else ' class="n"' if html[:1].isdigit() else ""
+    return f"<td{kind}>{html}</td>"

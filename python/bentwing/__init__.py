@@ -38,7 +38,8 @@ if TYPE_CHECKING:
     from bentwing.base.progress import Progress
     from bentwing.base.trajectory import Trajectory, read_tum
     from bentwing.base.window_record import WindowRecord
-    from bentwing.fleet.site import Site, map_fleet
+    from bentwing.fleet.record import Site
+    from bentwing.fleet.site import map_fleet
     from bentwing.flight.live.odometry import Odometry
     from bentwing.odometry.window import register_window
     from bentwing.odometry.window_result import WindowResult
@@ -78,7 +79,8 @@ else:
             "base.progress": ["Progress"],
             "base.trajectory": ["Trajectory", "read_tum"],
             "base.window_record": ["WindowRecord"],
-            "fleet.site": ["Site", "map_fleet"],
+            "fleet.record": ["Site"],
+            "fleet.site": ["map_fleet"],
             "flight.live.odometry": ["Odometry"],
             "odometry.window": ["register_window"],
             "odometry.window_result": ["WindowResult"],

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from bentwing.evaluate.verdict import Verdict
-    from bentwing.fleet.site import Site
+    from bentwing.fleet.record import Site
     from bentwing.run.merging import Merged
 
 

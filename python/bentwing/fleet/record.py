@@ -1,29 +1,60 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""site.json: what came of each recording, and which of them are in one map."""
+"""What came of many recordings, as a value and as site.json says it."""
 
 from __future__ import annotations
 
 import os
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from bentwing.base.regular_file import resolved
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
     from pathlib import Path
 
     from bentwing.fleet.groups import Group
-    from bentwing.fleet.site import Site
     from bentwing.fleet.task import Mapped
 
 
-def site_record(site: Site) -> dict[str, Any]:
-    """Return what the record of a site says, in plain JSON types; folders are relative to the site."""
-    return {
-        "recordings": [_recording(one, site.out) for one in site.recordings],
-        "groups": None if site.groups is None else [_group(one, site.out) for one in site.groups],
-        "failure": site.failure or None,
-        "places": site.places,
-    }
+@dataclass(frozen=True, slots=True)
+class Site:
+    """Many recordings, mapped.
+
+    Attributes
+    ----------
+    out : the folder
+    recordings : what came of each, in the order given
+    groups : runs in one frame each, the merged ones first; None where nothing was merged
+    failure : why there are no merged maps, empty where there are
+    places : what the merging compared, as in run.json
+    """
+
+    out: Path
+    recordings: list[Mapped]
+    groups: list[Group] | None = None
+    failure: str = ""
+    places: Mapping[str, Any] | None = None
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether every recording has a map that is not wrong, and the merging did not fail."""
+        maps = [one.state for one in self.groups or []]
+        return (
+            all(one.is_usable for one in self.recordings)
+            and not self.failure
+            and "failed" not in maps
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """Return what site.json says; folders are relative to the site."""
+        groups = self.groups
+        return {
+            "recordings": [_recording(one, self.out) for one in self.recordings],
+            "groups": None if groups is None else [_group(one, self.out) for one in groups],
+            "failure": self.failure or None,
+            "places": self.places,
+        }
 
 
 def _recording(one: Mapped, out: Path) -> dict[str, Any]:

@@ -20,7 +20,7 @@ from bentwing.fleet.groups import Group, merge_runs, merge_task
 from bentwing.fleet.manifest import MANIFEST_SUFFIXES, read_manifest
 from bentwing.fleet.memory import available_mb, n_side_by_side, process_mb
 from bentwing.fleet.pool import Job, LocalPool
-from bentwing.fleet.record import site_record
+from bentwing.fleet.record import Site
 from bentwing.fleet.task import (
     Choice,
     Mapped,
@@ -45,36 +45,6 @@ if TYPE_CHECKING:
 
     # Opens a pool for jobs of at most some memory, MB, and a number of them.
     Opened = Callable[[float, int], AbstractContextManager[Pool]]
-
-
-@dataclass(frozen=True, slots=True)
-class Site:
-    """Many recordings, mapped.
-
-    Attributes
-    ----------
-    out : the folder
-    recordings : what came of each, in the order given
-    groups : runs in one frame each, the merged ones first; None where nothing was merged
-    failure : why there are no merged maps, empty where there are
-    places : what the merging compared, as in run.json
-    """
-
-    out: Path
-    recordings: list[Mapped]
-    groups: list[Group] | None = None
-    failure: str = ""
-    places: Mapping[str, Any] | None = None
-
-    @property
-    def is_complete(self) -> bool:
-        """Whether every recording has a map that is not wrong, and the merging did not fail."""
-        maps = [one.state for one in self.groups or []]
-        return (
-            all(one.is_usable for one in self.recordings)
-            and not self.failure
-            and "failed" not in maps
-        )
 
 
 def map_fleet(
@@ -198,7 +168,7 @@ def map_site(
         site = Site(out, [mapped[entry.name] for entry in entries])
         if merges:
             site = _merged(site, choice, pool)
-        record = site_record(site)
+        record = site.to_json()
         write_site_page(folder.file(PAGE), record)
         folder.complete(manifests, record)
     return site

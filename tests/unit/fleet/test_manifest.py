@@ -57,7 +57,7 @@ def test_a_manifest_says_the_same_as_yaml_and_as_a_table(read, tmp_path, text, s
         ("recordings: a.bag", "recordings: "),
         ("recordings: [{name: a}]", "recordings[0].recording: required, but not given"),
         ("recordings: [{recording: []}]", "recordings[0].recording: "),
-        ("recordings: [{recording: a.bag, paylod: b}]", "recordings[0]: unknown key 'paylod'; did you mean 'payload'?"),
+        ("recordings: [{recording: a.bag, payloads: b}]", "recordings[0]: unknown key 'payloads'; did you mean 'payload'?"),
         ("recordings: [{recording: a.bag}, {recording: b.bag, start: -1}]", "recordings[1].start: "),
         ("recordings: [{recording: a.bag, start: .nan}]", "recordings[0].start: "),
         ("recordings: [{recording: a.bag, name: ../up}]", "'../up' cannot be the name of a folder"),

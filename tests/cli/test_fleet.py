@@ -152,6 +152,7 @@ def test_an_interrupted_batch_goes_on_where_it_was(flights, tmp_path):
             os.killpg(process.pid, signal.SIGINT)
             break
     rest = process.stderr.read()
+    process.stderr.close()
     assert process.wait(120) == 130, "".join(said) + rest
     assert rest.endswith("bentwing: error: interrupted\n")
     assert not record_of(out)["complete"]

@@ -71,8 +71,9 @@ def command(
     # slow to import, so only when it is needed
     from bentwing.base.progress import create_progress
     from bentwing.cli.done import say_site
-    from bentwing.fleet.site import map_site, on_cluster
-    from bentwing.fleet.task import Choice
+    from bentwing.fleet.opened import on_cluster
+    from bentwing.fleet.plan import Choice
+    from bentwing.fleet.site import map_site
     from bentwing.recording.sections.project import Project
     from bentwing.run.choose import given
 

@@ -102,8 +102,9 @@ def command(
     options.require_new_file(write_payload)
     progress = create_progress(quiet=quiet)
     if any(map(is_folder_of_recordings, recording)):
-        from bentwing.fleet.site import map_site, side_by_side
-        from bentwing.fleet.task import Choice
+        from bentwing.fleet.opened import side_by_side
+        from bentwing.fleet.plan import Choice
+        from bentwing.fleet.site import map_site
 
         if write_payload is not None:
             msg = "--write-payload with a folder of recordings: give it with one recording"

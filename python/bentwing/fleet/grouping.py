@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 from contextlib import nullcontext
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +22,7 @@ from bentwing.run.request import deciding, digest_of
 from bentwing.run.run import verdict_in
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping
 
     from bentwing.base.progress import Progress
     from bentwing.closing.joining.placing import Placed
@@ -62,7 +63,7 @@ def merge_groups(
     settings = settled(settings, sources)
     groups, found = find_groups(sources, settings, progress, lambda _: nullcontext())
     rooms = _Rooms(out, made, found, settings, budget_of(sources, settings).rate)
-    return {"groups": [rooms.answer(group) for group in groups], "places": found.record}
+    return {"groups": rooms.answers(groups), "places": found.record}
 
 
 @dataclass(slots=True)
@@ -79,25 +80,38 @@ class _Rooms:
     found: Ingredients
     settings: MergeSettings
     rate: float
-    _taken: set[str] = field(default_factory=set)
 
-    def answer(self, group: Placed) -> dict[str, Any]:
-        """Say what a group is, and make its map if there is none yet."""
+    def answers(self, groups: list[Placed]) -> list[dict[str, Any]]:
+        """Say what each group is, and make the maps that are not there yet."""
+        asked = [self._asked(group) for group in groups]
+        kept = {request for _, _, request in asked if request in self.made}
+        free = _numbers({Path(self.made[request]).name for request in kept})
+        found = []
+        for group, (members, described, request) in zip(groups, asked, strict=True):
+            said = {"runs": described["runs"], "n_links": described["n_links"]}
+            if len(members) == 1:
+                folder, verdict = None, members[0].verdict
+            elif request in kept:
+                folder = Path(self.made[request]).name
+                verdict = verdict_in(read_record(Path(self.made[request])))
+            else:
+                folder = next(free)
+                verdict = self._make(group, members, {**described, "folder": folder}, request)
+            found.append(
+                {
+                    **said,
+                    "folder": folder,
+                    "verdict": verdict.to_json(),
+                    "is_earlier": request in kept,
+                }
+            )
+        return found
+
+    def _asked(self, group: Placed) -> tuple[list[Source], dict[str, Any], str]:
+        """Return the runs of a group, what it consists of, and its request."""
         described = describe_map("", group, self.found)
         members = [source for source in self.found.sources if source.name in described["runs"]]
-        said = {"runs": described["runs"], "n_links": described["n_links"]}
-        if len(members) == 1:
-            return {**said, "folder": None, "verdict": members[0].verdict.to_json()}
-        request = self._request(members, described)
-        earlier = self.made.get(request)
-        if earlier is not None:
-            folder, verdict = Path(earlier).name, verdict_in(read_record(Path(earlier)))
-        else:
-            folder = self._free()
-            verdict = self._make(group, members, {**described, "folder": folder}, request)
-        return {
-            **said, "folder": folder, "verdict": verdict.to_json(), "is_earlier": earlier is not None,
-        }  # fmt: skip
+        return members, described, self._request(members, described)
 
     def _make(
         self, group: Placed, members: list[Source], described: dict[str, Any], request: str
@@ -112,11 +126,7 @@ class _Rooms:
         asked = {"settings": deciding(self.settings), "rate": self.rate, "runs": runs}
         return digest_of({**asked, "graph": described["graph"]})
 
-    def _free(self) -> str:
-        """Return the lowest number that no folder has."""
-        self._taken |= {Path(folder).name for folder in self.made.values()}
-        number = 1
-        while str(number) in self._taken:
-            number += 1
-        self._taken.add(str(number))
-        return str(number)
+
+def _numbers(taken: set[str]) -> Iterator[str]:
+    """Yield the numbers from one on that no group has."""
+    return (str(n) for n in count(1) if str(n) not in taken)

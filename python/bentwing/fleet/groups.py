@@ -98,9 +98,9 @@ def merge_runs(
     ------
     ProcessDiedError
     """
-    done = _finished(task)
+    done = finished_merging(task)
     if done is not None:
-        return {**done, "groups": [{**group, "is_earlier": True} for group in done["groups"]]}
+        return done
     staging = staging_of(task.place, task.request)
     staging.mkdir(parents=True, exist_ok=True)
     order = {
@@ -123,7 +123,7 @@ def merge_runs(
     return answer
 
 
-def _finished(task: MergeTask) -> dict[str, Any] | None:
+def finished_merging(task: MergeTask) -> dict[str, Any] | None:
     """Return the answer of an earlier merging of the same runs whose maps are there."""
     try:
         answer = json.loads((task.place / ANSWER).read_text(encoding="utf-8"))
@@ -134,7 +134,7 @@ def _finished(task: MergeTask) -> dict[str, Any] | None:
                 finished_record(task.place / group["folder"])
     except (OSError, ValueError, LookupError, AttributeError, TypeError, BentwingError):
         return None
-    return dict(answer)
+    return {**answer, "groups": [{**group, "is_earlier": True} for group in answer["groups"]]}
 
 
 def _made(place: Path) -> dict[str, str]:

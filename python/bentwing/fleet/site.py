@@ -3,8 +3,8 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack, contextmanager, nullcontext
-from dataclasses import dataclass, replace
+from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,38 +13,27 @@ from bentwing.base.regular_file import resolved
 from bentwing.base.result_folder import ResultFolder
 from bentwing.closing.global_registration import Budget
 from bentwing.evaluate.verdict import Verdict
-from bentwing.fleet.cluster import ClusterPool, address_of, connected, started
 from bentwing.fleet.discover import find_recordings
 from bentwing.fleet.folder import GROUPS, PAGE, RECORDINGS, SITE_FOLDER
-from bentwing.fleet.groups import Group, merge_runs, merge_task
+from bentwing.fleet.groups import Group, finished_merging, merge_runs, merge_task
 from bentwing.fleet.manifest import MANIFEST_SUFFIXES, read_manifest
-from bentwing.fleet.memory import available_mb, n_side_by_side, process_mb
-from bentwing.fleet.pool import Job, LocalPool
+from bentwing.fleet.memory import process_mb
+from bentwing.fleet.opened import LazyPool, on_cluster
+from bentwing.fleet.plan import Choice, plan
+from bentwing.fleet.pool import Job
 from bentwing.fleet.record import Site
-from bentwing.fleet.task import (
-    Choice,
-    Mapped,
-    finished,
-    map_recording_of,
-    plan,
-    reason_of,
-    sentence_of,
-)
+from bentwing.fleet.task import Mapped, finished, map_recording_of, reason_of, sentence_of
 from bentwing.report.site import write_site_page
 from bentwing.run.settings import merge_settings
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
-    from contextlib import AbstractContextManager
+    from collections.abc import Iterator, Mapping, Sequence
 
     from bentwing.fleet.entry import Entry
-    from bentwing.fleet.pool import Pool
+    from bentwing.fleet.opened import Opened
     from bentwing.fleet.task import MapTask
     from bentwing.map import MapFormat
     from bentwing.odometry import EstimatorName
-
-    # Opens a pool for jobs of at most some memory, MB, and a number of them.
-    Opened = Callable[[float, int], AbstractContextManager[Pool]]
 
 
 def map_fleet(
@@ -102,44 +91,6 @@ def map_fleet(
     return map_site([Path(path) for path in given_paths], Path(out), choice, opened, shown)
 
 
-def on_cluster(
-    threads: int | None,
-    progress: Progress,
-    *,
-    workers: int | None = None,
-    scheduler: str | None = None,
-    client: Any = None,  # noqa: ANN401 - dask's
-) -> Opened:
-    """Return what opens a pool on a cluster; see `map_fleet`."""
-    if client is not None:
-        return lambda _megabytes, _n_jobs: nullcontext(ClusterPool(client, threads))
-    address = address_of(scheduler, workers)
-
-    def opened(megabytes: float, n_jobs: int) -> AbstractContextManager[Pool]:
-        if address is not None:
-            return connected(address, threads, progress)
-        n = n_side_by_side(megabytes, n_jobs, workers)
-        return started(n, megabytes, threads, progress)
-
-    return opened
-
-
-def side_by_side(threads: int | None, progress: Progress) -> Opened:
-    """Return what opens a pool on this machine, of two jobs at the same time where memory allows."""
-
-    @contextmanager
-    def opened(megabytes: float, n_jobs: int) -> Iterator[Pool]:
-        n = n_side_by_side(megabytes, n_jobs, None)
-        progress.note(
-            f"{n} at a time: the largest recording takes about {megabytes / 1e3:.1f} GB, "
-            f"{available_mb() / 1e3:.1f} GB are free"
-        )
-        with LocalPool(n, threads, progress.note) as pool:
-            yield pool
-
-    return opened
-
-
 def map_site(
     paths: Sequence[Path],
     out: Path,
@@ -163,7 +114,7 @@ def map_site(
     with ResultFolder(out, SITE_FOLDER, read) as folder, ExitStack() as stack:
         runs.mkdir(exist_ok=True)
         tasks, refused = plan(entries, resolved(runs), choice)
-        pool = _Lazy(opened, stack, tasks)
+        pool = LazyPool(opened, stack)
         mapped = {one.name: one for one in [*refused, *_map(tasks, pool, progress)]}
         site = Site(out, [mapped[entry.name] for entry in entries])
         if merges:
@@ -181,26 +132,7 @@ def _entries(paths: Sequence[Path]) -> tuple[list[Entry], list[Path]]:
     return find_recordings(paths), []
 
 
-@dataclass(slots=True)
-class _Lazy:
-    """A pool that is opened when there is something to do."""
-
-    opened: Opened
-    stack: ExitStack
-    tasks: Sequence[MapTask]
-    pool: Pool | None = None
-
-    def results(self, jobs: Sequence[Job]) -> Iterator[tuple[Job, Any]]:
-        """Run jobs; see `Pool`."""
-        if not jobs:
-            return iter(())
-        if self.pool is None:
-            most = max(job.megabytes for job in jobs)
-            self.pool = self.stack.enter_context(self.opened(most, len(jobs)))
-        return self.pool.results(jobs)
-
-
-def _map(tasks: Sequence[MapTask], pool: _Lazy, progress: Progress) -> Iterator[Mapped]:
+def _map(tasks: Sequence[MapTask], pool: LazyPool, progress: Progress) -> Iterator[Mapped]:
     """Yield what came of each recording, those first that are there already."""
     todo = []
     for task in tasks:
@@ -227,7 +159,7 @@ def _of_result(task: MapTask, result: Mapped | BaseException) -> Mapped:
     return Mapped(task.name, "failed", reason, request=task.request)
 
 
-def _merged(site: Site, choice: Choice, pool: _Lazy) -> Site:
+def _merged(site: Site, choice: Choice, pool: LazyPool) -> Site:
     """Merge the runs that can be used."""
     usable = [one for one in site.recordings if one.is_usable]
     alone = [Group((one.name,), one.folder or site.out, one.state, one.reason) for one in usable]
@@ -239,7 +171,9 @@ def _merged(site: Site, choice: Choice, pool: _Lazy) -> Site:
     merging = merge_settings(**wanted, loop_closure=settings.closing)
     budget = Budget.of(sum(one.seconds for one in usable), merging.loop_closure)
     task = merge_task(resolved(site.out) / GROUPS, usable, merging, process_mb(budget.megabytes))
-    ((_, answer),) = pool.results([Job(task.key, merge_runs, task, task.megabytes)])
+    answer = finished_merging(task)
+    if answer is None:
+        ((_, answer),) = pool.results([Job(task.key, merge_runs, task, task.megabytes)])
     if isinstance(answer, BaseException):
         answer = {"failed": str(answer) or type(answer).__name__}
     if "failed" in answer:

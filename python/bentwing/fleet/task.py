@@ -10,51 +10,17 @@ from bentwing.base.errors import BentwingError, UsageError
 from bentwing.base.provenance import bentwing_version
 from bentwing.base.run_record import RUN_FOLDER, understood
 from bentwing.fleet.folder import publish, require_run_or_nothing, staging_of
-from bentwing.fleet.memory import megabytes_of
 from bentwing.fleet.process import Processes, run_process
-from bentwing.recording.sections.project import Project
-from bentwing.run.choose import choose, given, merged
-from bentwing.run.request import inputs_of, record_of_request, request_of
+from bentwing.run.request import record_of_request
 from bentwing.run.run import verdict_in
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Mapping
     from pathlib import Path
 
     from bentwing.evaluate.verdict import Verdict
-    from bentwing.fleet.entry import Entry
-    from bentwing.run.settings import RunSettings
 
 State = Literal["good", "doubtful", "failed", "refused"]
-
-
-@dataclass(frozen=True, slots=True)
-class Choice:
-    """Settings of all recordings, as `bentwing.run.choose.choose` takes them.
-
-    Attributes
-    ----------
-    file : of settings
-    assignments : as `window=4`
-    payload : of the recordings that have none of their own
-    options : nested settings
-    """
-
-    file: Path | None = None
-    assignments: tuple[str, ...] = ()
-    payload: Path | None = None
-    options: Mapping[str, Any] = field(default_factory=dict)
-
-    def settings(self, entry: Entry | None = None) -> RunSettings:
-        """Return the settings of a recording, or of all that say nothing of their own; raises as `choose`."""
-        options, payload = dict(self.options), self.payload
-        if entry is not None:
-            project = None if entry.project is None else Project.load(entry.project)
-            options |= given(project=project, start=entry.start)
-            if entry.marks is not None:
-                options = merged(options, {"georeferencing": {"control_points": entry.marks}})
-            payload = entry.payload or payload
-        return choose(self.file, self.assignments, payload, options)
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,67 +84,6 @@ class Mapped:
     def is_usable(self) -> bool:
         """Whether there is a map that is not wrong."""
         return self.state in {"good", "doubtful"}
-
-
-def plan(
-    entries: Sequence[Entry], runs: Path, choice: Choice
-) -> tuple[list[MapTask], list[Mapped]]:
-    """Return what is to be done, and what cannot be.
-
-    Parameters
-    ----------
-    runs : folder of the run folders
-    """
-    tasks: list[MapTask] = []
-    refused: list[Mapped] = []
-    seen: dict[tuple[Any, ...], str] = {}
-    for entry in entries:
-        found = _task_of(entry, runs, choice, seen)
-        if isinstance(found, Mapped):
-            refused.append(found)
-        else:
-            tasks.append(found)
-    return tasks, refused
-
-
-def _task_of(
-    entry: Entry, runs: Path, choice: Choice, seen: dict[tuple[Any, ...], str]
-) -> MapTask | Mapped:
-    """Return what is to be done for a recording, or that it is refused.
-
-    Parameters
-    ----------
-    seen : names of recordings by their content; this one's is added
-    """
-    try:
-        task, content = _described(entry, runs, choice)
-    except OSError as error:
-        reason = f"{error.filename or entry.parts[0]}: {error.strerror or error}"
-        return Mapped(entry.name, "refused", reason)
-    except BentwingError as error:
-        return Mapped(entry.name, "refused", str(error))
-    if content in seen:
-        reason = f"{entry.parts[0]}: is the same recording as {seen[content]}; give each once"
-        return Mapped(entry.name, "refused", reason)
-    seen[content] = entry.name
-    return task
-
-
-def _described(entry: Entry, runs: Path, choice: Choice) -> tuple[MapTask, tuple[Any, ...]]:
-    """Return what is to be done, and what tells the recording from others."""
-    for part in entry.parts:
-        part.stat()  # the system says what is wrong with it
-    settings = choice.settings(entry)
-    payload = entry.payload or choice.payload
-    inputs = inputs_of([*entry.parts, *([payload] if payload else [])])
-    read = inputs[:-1] if payload else inputs
-    request = request_of(settings, inputs)
-    size = sum(one["bytes"] for one in read)
-    task = MapTask(
-        entry.name, runs / entry.name, entry.parts, payload, settings.to_yaml(), request,
-        megabytes_of(size, settings.closing),
-    )  # fmt: skip
-    return task, (*sorted(one["sha256"] for one in read), settings.start)
 
 
 def finished(task: MapTask) -> Mapped | None:

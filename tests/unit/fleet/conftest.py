@@ -46,12 +46,15 @@ class FakeWork:
 
     def _map(self, order):
         recordings = [Path(path) for path in order["recordings"]]
+        assert all(path.is_absolute() for path in recordings)  # a worker is in another folder
         content = recordings[0].read_text()
         if content.startswith("refused"):
             return {"refused": f"{recordings[0]}: no message could be read"}
         if content.startswith("failed"):
             return {"failed": "too few points"}
         settings = RunSettings.model_validate(parse_yaml(order["settings"]))
+        marks = settings.georeferencing.control_points
+        assert marks is None or marks.is_absolute()
         read = [*recordings, *([Path(order["payload"])] if order["payload"] else [])]
         request = request_of(settings, inputs_of(read))
         write_run(Path(order["out"]), request, recordings)

@@ -12,8 +12,9 @@ import pytest
 from bentwing.base.errors import InputError, UsageError
 from bentwing.base.progress import LineProgress, Progress
 from bentwing.fleet.cluster import MEMORY, RETRIES
-from bentwing.fleet.site import map_fleet, map_site, side_by_side
-from bentwing.fleet.task import Choice
+from bentwing.fleet.opened import side_by_side
+from bentwing.fleet.plan import Choice
+from bentwing.fleet.site import map_fleet, map_site
 
 
 @pytest.fixture(scope="module")
@@ -104,6 +105,17 @@ def test_a_recording_that_is_left_out_leaves_its_group(fleet, manifest):
     site = fleet(manifest(a1="1", b1="3"))
     assert [group.runs for group in site.groups] == [("a1",), ("b1",)]
     assert [path.name for path in (site.out / "groups").iterdir()] == ["groups.json"]
+
+
+def test_paths_are_those_of_the_caller_wherever_the_work_is_done(
+    fleet, manifest, tmp_path, monkeypatch
+):
+    manifest(a1="1")
+    (tmp_path / "marks.csv").write_text("id,x,y,z\nm1,0,0,0\n")
+    (tmp_path / "settings.yaml").write_text("georeferencing: {control_points: marks.csv}")
+    monkeypatch.chdir(tmp_path)
+    site = fleet("flights.csv", settings="settings.yaml")
+    assert states(site) == {"a1": "good"}
 
 
 def test_a_changed_recording_is_mapped_again_and_no_other(fleet, manifest, work):

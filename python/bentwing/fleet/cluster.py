@@ -6,6 +6,7 @@ from __future__ import annotations
 import logging
 import os
 from contextlib import contextmanager
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 from bentwing.base.errors import InputError, UsageError
@@ -154,13 +155,13 @@ def started(
         ) as cluster,
         distributed.Client(cluster) as client,
     ):
-        _say(client, progress)
+        _say(client, progress, "" if find_spec("bokeh") else "; pip install bokeh to see it")
         yield ClusterPool(client, threads, n)
 
 
-def _say(client: Any, progress: Progress) -> None:  # noqa: ANN401 - dask's
+def _say(client: Any, progress: Progress, hint: str = "") -> None:  # noqa: ANN401 - dask's
     if link := client.dashboard_link:
-        progress.note(f"dashboard: {link}")
+        progress.note(f"dashboard: {link}{hint}")
 
 
 def _memory_of_workers(client: Any) -> float | None:  # noqa: ANN401 - dask's

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bentwing.base.errors import BentwingError, RecordingError
+from bentwing.base.regular_file import resolved
 from bentwing.base.run_record import RECORD
 from bentwing.fleet.entry import Entry
 from bentwing.fleet.folder import SITE_RECORD
@@ -54,11 +55,14 @@ def find_recordings(paths: Sequence[Path]) -> list[Entry]:
 
 def _walk(top: Path) -> Iterator[tuple[Path, ...]]:
     """Yield the recordings below a folder, without the results of earlier runs."""
-    for folder, inside, files in os.walk(top):
-        if RECORD in files or SITE_RECORD in files:
+    seen: set[Path] = set()
+    for folder, inside, files in os.walk(top, followlinks=True):
+        here = Path(folder)
+        is_result = RECORD in files or SITE_RECORD in files
+        if is_result or resolved(here) in seen:  # links may run in a circle
             inside.clear()
             continue
-        here = Path(folder)
+        seen.add(resolved(here))
         recordings = [name for name in sorted(inside) if not is_folder_of_recordings(here / name)]
         inside[:] = sorted(n for n in {*inside} - {*recordings} if not n.startswith("."))
         yield from ((here / name,) for name in recordings)

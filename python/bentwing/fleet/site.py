@@ -143,16 +143,10 @@ def _map(tasks: Sequence[MapTask], pool: LazyPool, progress: Progress) -> Iterat
             yield done
     if len(todo) < len(tasks):
         progress.note(f"{len(tasks) - len(todo)} of {len(tasks)} recordings are mapped already")
-    if not todo:
-        return
-    results = enumerate(pool.results(todo), start=1)
-    with progress.stage("map", len(todo), "recordings") as stage:
-        for number, (job, result) in results:
-            one = _of_result(job.task, result)
-            said = sentence_of(one.state, one.reason)
-            progress.note(f"[{number}/{len(todo)}] {one.name}: {said}")
-            stage.advance(1)
-            yield one
+    for number, (job, result) in enumerate(pool.results(todo), start=1):
+        one = _of_result(job.task, result)
+        progress.note(f"[{number}/{len(todo)}] {one.name}: {sentence_of(one.state, one.reason)}")
+        yield one
 
 
 def _of_result(task: MapTask, result: Mapped | BaseException) -> Mapped:

@@ -51,6 +51,16 @@ def test_a_folder_of_ros_2_files_is_one_recording(tree):
     assert found(folder) == {"x": ["x"], "y": ["y"]}
 
 
+def test_links_are_followed_and_may_run_in_a_circle(tree, tmp_path):
+    elsewhere = tmp_path / "disk"
+    elsewhere.mkdir()
+    (elsewhere / "b.bag").touch()
+    folder = tree("a.bag")
+    (folder / "disk").symlink_to(elsewhere)
+    (elsewhere / "round").symlink_to(folder)
+    assert found(folder) == {"a": ["a.bag"], "disk_b": ["disk/b.bag"]}
+
+
 def test_results_and_hidden_files_are_no_recordings(tree):
     folder = tree("a.bag", "run/run.json", "run/b.bag", "site/site.json", "site/recordings/c.bag", ".d.bag", ".e/f.bag")  # fmt: skip
     assert list(found(folder)) == ["a"]

@@ -214,7 +214,7 @@ def test_the_memory_of_the_work_is_stated(manifest, tmp_path, capsys):
     opened = side_by_side(None, LineProgress())
     map_site([manifest(a1="1")], tmp_path / "out", Choice(), opened, LineProgress(), merges=False)
     said = capsys.readouterr().err
-    assert "1 at a time: the largest recording takes about 0.5 GB" in said
+    assert "1 at a time: the largest recording takes about 0.7 GB" in said
     assert "[1/1] a1: good" in said
 
 

@@ -16,6 +16,7 @@ from bentwing.base.errors import BentwingError, EstimationError, FolderBusyError
 from bentwing.base.plain import plain
 from bentwing.base.progress import LineProgress
 from bentwing.base.yaml_files import parse_yaml
+from bentwing.fleet.process import BUSY
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -38,8 +39,8 @@ def map_one(order: dict[str, Any], progress: Progress) -> dict[str, str]:
         run_recording(
             recordings, order["out"], settings, order["payload"], resume=True, progress=progress
         )
-    except FolderBusyError:  # a twin of this work; whoever asked tries again
-        raise
+    except FolderBusyError as error:
+        return {BUSY: str(error)}
     except EstimationError as error:
         return {"failed": str(error)}
     except BentwingError as error:
@@ -56,8 +57,8 @@ def merge_all(order: dict[str, Any], progress: Progress) -> dict[str, Any]:
     settings = settings.model_copy(update={"threads": order["threads"]})
     try:
         return merge_groups(order["runs"], Path(order["out"]), settings, order["made"], progress)
-    except FolderBusyError:
-        raise
+    except FolderBusyError as error:
+        return {BUSY: str(error)}
     except BentwingError as error:
         return {"failed": str(error)}
 

@@ -69,6 +69,11 @@ def publish(staging: Path, place: Path) -> None:
         if place.exists():  # beside the run there is something else
             raise UsageError(_OTHER.format(place=place))
         staging.replace(place)
+    clear_staging(place)
+
+
+def clear_staging(place: Path) -> None:
+    """Remove what was made for a place and is not needed any more, of whatever request and host."""
     for left in place.parent.iterdir():
         if _name_in(left.name) == place.name:
             shutil.rmtree(left, ignore_errors=True)

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 from bentwing.base.atomic import write_text
 from bentwing.base.errors import BentwingError
 from bentwing.base.run_record import RUN_FOLDER, finished_record
-from bentwing.fleet.folder import publish, staging_of
-from bentwing.fleet.process import Processes, run_process
+from bentwing.fleet.folder import clear_staging, publish, staging_of
+from bentwing.fleet.process import Processes, run_unless_done
 from bentwing.run.request import deciding, digest_of, record_of_request
 
 if TYPE_CHECKING:
@@ -98,26 +98,22 @@ def merge_runs(
     ------
     ProcessDiedError
     """
-    done = finished_merging(task)
-    if done is not None:
-        return done
     staging = staging_of(task.place, task.request)
-    staging.mkdir(parents=True, exist_ok=True)
     order = {
         "runs": task.runs, "settings": task.settings, "threads": threads, "out": staging,
         "made": _made(task.place),
     }  # fmt: skip
-    answer = run_process("merge", order, "merge", processes)
-    if "failed" in answer:
+    answer = run_unless_done("merge", order, "merge", processes, lambda: finished_merging(task))
+    if "failed" in answer or "request" in answer:
         return answer
     task.place.mkdir(exist_ok=True)
     named = {group["folder"] for group in answer["groups"]} - {None}
     for old in task.place.iterdir():
         if old.name not in named and RUN_FOLDER.read(old) is not None:
             RUN_FOLDER.remove(old)
-    for made in sorted(staging.iterdir()):
+    for made in sorted(staging.iterdir()) if staging.is_dir() else []:
         publish(made, task.place / made.name)
-    staging.rmdir()
+    clear_staging(task.place)
     answer = {**answer, "request": task.request}
     write_text(task.place / ANSWER, json.dumps(answer, indent=1))
     return answer

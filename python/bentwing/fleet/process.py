@@ -11,21 +11,26 @@ import json
 import os
 import subprocess
 import sys
+import time
 from collections import deque
 from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from bentwing.base.plain import plain
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
+_Result = TypeVar("_Result")
 # The same modules as here, and not those that happen to lie where the command was started.
 _START = "import sys; sys.path[:] = {path!r}; from bentwing.fleet.child import main; main()"
 _BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 _KILLED = -9
+BUSY = "busy"
+"""In an answer: another process does the same work, as one whose worker was given up too early."""
+_PAUSE = 5.0  # s before looking again whether that has ended
 
 
 class ProcessDiedError(RuntimeError):
@@ -86,6 +91,31 @@ def run_process(
             found: dict[str, Any] = json.loads(answer.read_text(encoding="utf-8"))
             return found
     raise ProcessDiedError(_why(code, last))
+
+
+def run_unless_done(
+    work: str,
+    argument: Mapping[str, Any],
+    name: str,
+    processes: Processes | None,
+    done: Callable[[], _Result | None],
+) -> _Result | dict[str, Any]:
+    """Return what is done already, or the answer of a process; wait for a twin that does the same.
+
+    Parameters
+    ----------
+    done : returns the result if it is there
+
+    Raises
+    ------
+    ProcessDiedError
+    """
+    while (result := done()) is None:
+        answer = run_process(work, argument, name, processes)
+        if BUSY not in answer:
+            return answer
+        time.sleep(_PAUSE)
+    return result
 
 
 def _run(order: str, name: str, processes: Processes | None) -> tuple[int, str]:

@@ -10,7 +10,7 @@ from bentwing.base.errors import BentwingError, UsageError
 from bentwing.base.provenance import bentwing_version
 from bentwing.base.run_record import RUN_FOLDER, understood
 from bentwing.fleet.folder import publish, require_run_or_nothing, staging_of
-from bentwing.fleet.process import Processes, run_process
+from bentwing.fleet.process import Processes, run_unless_done
 from bentwing.run.request import record_of_request
 from bentwing.run.run import verdict_in
 
@@ -103,7 +103,7 @@ def map_recording_of(
         If it ended without an answer: it may be worth another try.
     """
     try:
-        return finished(task) or _made(task, threads, processes)
+        return _made(task, threads, processes)
     except BentwingError as error:
         return Mapped(task.name, "refused", str(error), request=task.request)
 
@@ -118,10 +118,13 @@ def _made(task: MapTask, threads: int | None, processes: Processes | None) -> Ma
         "recordings": task.recordings, "payload": task.payload, "settings": task.settings,
         "threads": threads, "out": staging,
     }  # fmt: skip
-    answer = run_process("map", order, task.name, processes)
+    answer = run_unless_done("map", order, task.name, processes, lambda: finished(task))
+    if isinstance(answer, Mapped):
+        return answer
+    folder = None
     if RUN_FOLDER.read(staging) is not None:
         publish(staging, task.place)
-    folder = task.place if RUN_FOLDER.read(task.place) is not None else None
+        folder = task.place
     if "failed" in answer:
         return Mapped(task.name, "failed", answer["failed"], folder, task.request)
     if "refused" in answer:

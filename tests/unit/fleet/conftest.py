@@ -13,8 +13,8 @@ import pytest
 from bentwing.base.plain import plain
 from bentwing.base.yaml_files import parse_yaml
 from bentwing.evaluate.verdict import verdict_of
-from bentwing.fleet import groups, task
-from bentwing.fleet.process import ProcessDiedError
+from bentwing.fleet import process
+from bentwing.fleet.process import BUSY, ProcessDiedError
 from bentwing.run.request import inputs_of, request_of
 from bentwing.run.settings import RunSettings
 from support.finished_runs import finished_run
@@ -29,19 +29,23 @@ class FakeWork:
     ----------
     calls : how often each recording was mapped, and how often the runs were merged
     deaths : how often the work of each name is still to die
+    twins : names whose work another process does first
     """
 
     def __init__(self) -> None:
         self.calls: Counter[str] = Counter()
         self.deaths: Counter[str] = Counter()
+        self.twins: set[str] = set()
 
-    def __call__(self, work, order, name, processes=None):
-        del processes
+    def __call__(self, work, order, name, _processes):
         self.calls[name] += 1
         if self.deaths[name]:
             self.deaths[name] -= 1
             msg = f"the process of {name} was killed"
             raise ProcessDiedError(msg)
+        if name in self.twins:
+            self._map({**order, "out": Path(order["out"]).parent / name})
+            return {BUSY: "another process is writing there"}
         return self._map(order) if work == "map" else self._merge(order)
 
     def _map(self, order):
@@ -100,8 +104,8 @@ def write_run(folder, request, recordings):
 def work(monkeypatch):
     """Put the fake in the place of the processes."""
     fake = FakeWork()
-    monkeypatch.setattr(task, "run_process", fake)
-    monkeypatch.setattr(groups, "run_process", fake)
+    monkeypatch.setattr(process, "run_process", fake)
+    monkeypatch.setattr(process, "_PAUSE", 0.0)
     return fake
 
 

@@ -139,6 +139,21 @@ def test_work_that_dies_is_tried_again(fleet, manifest, work):
     site = fleet(manifest(a1="1", a2="2"))
     assert site.is_complete
     assert work.calls["a1"] == work.calls["merge"] == RETRIES + 1
+    names = {path.name for path in site.out.iterdir()}
+    assert names == {"recordings", "groups", "site.json", "index.html"}
+
+
+def test_work_that_another_process_does_is_waited_for(fleet, manifest, work):
+    work.twins.add("a1")
+    assert fleet(manifest(a1="1", a2="2")).is_complete
+    assert work.calls["a1"] == 1
+
+
+def test_a_recording_that_is_damaged_now_does_not_show_its_earlier_run(fleet, manifest):
+    fleet(manifest(a1="1"))
+    site = fleet(manifest(a1="refused"))
+    assert states(site) == {"a1": "refused"}
+    assert record_of(site)["recordings"][0]["folder"] is None
 
 
 def test_work_that_keeps_dying_is_named_and_the_rest_is_done(fleet, manifest, work):

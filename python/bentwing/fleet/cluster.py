@@ -24,8 +24,12 @@ MEMORY = "MEM"
 """Resource of workers: the memory that they have for bentwing, MB."""
 RETRIES = 2
 """Times that work is tried again which ended without an answer."""
-# A task is not to blame for workers that a batch system ends at their time limit.
-_ALLOWED_FAILURES = 20
+# A recording is not to blame for every worker that dies while it maps it; and there is nothing to
+# profile in a worker that waits for a process.
+_OF_CLUSTER = {
+    "distributed.scheduler.allowed-failures": 20,
+    "distributed.worker.profile.enabled": False,
+}
 _PATIENCE = "20s"
 
 
@@ -144,7 +148,7 @@ def started(
         f"the largest recording takes about {megabytes / 1e3:.1f} GB"
     )
     with (
-        dask.config.set({"distributed.scheduler.allowed-failures": _ALLOWED_FAILURES}),
+        dask.config.set(_OF_CLUSTER),
         distributed.LocalCluster(
             n_workers=n,
             threads_per_worker=1,

@@ -38,6 +38,8 @@ if TYPE_CHECKING:
     from bentwing.base.progress import Progress
     from bentwing.base.trajectory import Trajectory, read_tum
     from bentwing.base.window_record import WindowRecord
+    from bentwing.fleet.record import Site
+    from bentwing.fleet.site import map_fleet
     from bentwing.flight.live.odometry import Odometry
     from bentwing.odometry.window import register_window
     from bentwing.odometry.window_result import WindowResult
@@ -78,6 +80,8 @@ else:
             "base.progress": ["Progress"],
             "base.trajectory": ["Trajectory", "read_tum"],
             "base.window_record": ["WindowRecord"],
+            "fleet.record": ["Site"],
+            "fleet.site": ["map_fleet"],
             "flight.live.odometry": ["Odometry"],
             "odometry.window": ["register_window"],
             "odometry.window_result": ["WindowResult"],
@@ -140,6 +144,7 @@ __all__ = [
     "RecordingError",
     "Run",
     "SingularSystemError",
+    "Site",
     "Trajectory",
     "UsageError",
     "WindowRecord",
@@ -147,6 +152,7 @@ __all__ = [
     "__version__",
     "export",
     "export_points",
+    "map_fleet",
     "map_recording",
     "merge",
     "read_tum",

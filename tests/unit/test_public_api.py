@@ -21,7 +21,7 @@ from support.structure import PACKAGE, ROOT
 
 PUBLIC = ["bentwing", *(f"bentwing.{name}" for name in bentwing.PACKAGES)]
 # The command line is public by its commands; the values of `base` are in `bentwing` itself.
-INTERNAL = {"__main__", "_core", "base", "cli", "report", "reproduce", "run"}
+INTERNAL = {"__main__", "_core", "base", "cli", "fleet", "report", "reproduce", "run"}
 NAMES = [(module, name) for module in PUBLIC for name in import_module(module).__all__]
 
 

@@ -19,6 +19,10 @@ class UsageError(BentwingError):
     exit_code = 2
 
 
+class FolderBusyError(UsageError):
+    """Another process writes into the folder."""
+
+
 class InputError(BentwingError):
     """An input cannot be used."""
 
@@ -49,3 +53,9 @@ class SingularSystemError(EstimationError):
 
 class DivergedError(EstimationError):
     """The estimate left the range in which it can be right."""
+
+
+class PartialError(BentwingError):
+    """Of several recordings, some were not mapped; the others were."""
+
+    exit_code = 5

@@ -11,7 +11,7 @@ from contextlib import suppress
 from datetime import datetime, timezone
 from typing import TYPE_CHECKING
 
-from bentwing.base.errors import UsageError
+from bentwing.base.errors import FolderBusyError
 
 if sys.platform != "win32":
     import fcntl
@@ -40,7 +40,7 @@ class FolderLock:
 
         Raises
         ------
-        UsageError
+        FolderBusyError
             Another process has it, which is named with its host.
         """
         while self._descriptor is None:
@@ -79,7 +79,7 @@ class FolderLock:
                 f"{holder.get('host', 'this host')} is writing there since "
                 f"{holder.get('since', 'an unknown time')}; wait for it, or choose another folder"
             )
-            raise UsageError(msg) from None
+            raise FolderBusyError(msg) from None
         except OSError:  # a file system without locks; what the file says is all there is
             pass
 
@@ -92,7 +92,7 @@ class FolderLock:
                 f"{holder.get('since')} and did not say that it has ended; if it has, remove "
                 f"{self._path}"
             )
-            raise UsageError(msg)
+            raise FolderBusyError(msg)
 
 
 def _is_file(path: Path, descriptor: int) -> bool:

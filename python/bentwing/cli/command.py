@@ -25,6 +25,7 @@ _EXIT_CODES = """\
   2    the call is wrong
   3    an input cannot be used, or a recording is unfit for mapping
   4    the estimation failed, or the map is wrong; what was computed is kept
+  5    some recordings are mapped, others are not
   130  interrupted; what was computed is kept"""
 
 

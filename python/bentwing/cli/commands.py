@@ -16,6 +16,7 @@ from bentwing.cli.mistakes import did_you_mean
 COMMANDS = {
     "map": "Turn a recording into a trajectory, a map and a report.",
     "localize": "Find a recording in a map, and report what has changed.",
+    "fleet": "Map many recordings on a cluster, and merge them.",
     "merge": "Put several runs into one map.",
     "export": "Write a run's map or trajectory in another form.",
     "info": "Check whether a recording is fit for mapping.",

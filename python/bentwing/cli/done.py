@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from bentwing.base.errors import EstimationError
+from bentwing.base.errors import EstimationError, InputError, PartialError
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from bentwing.evaluate.verdict import Verdict
+    from bentwing.fleet.record import Site
     from bentwing.run.merging import Merged
 
 
@@ -44,6 +45,54 @@ def say_maps(merged: Merged, *, quiet: bool) -> None:
             names, report = ", ".join(one.names), one.out / "report.html"
             typer.echo(f"{one.out}: {names}; {one.verdict.sentence()}; open {report}", err=quiet)
     _require([(one.out, one.verdict) for one in merged.maps])
+
+
+def say_site(site: Site, *, quiet: bool) -> None:
+    """Say what came of each of many recordings, and which maps there are.
+
+    Raises
+    ------
+    PartialError, EstimationError, InputError
+        If not all of them have a map that can be used: if some have, if some failed, or if all are
+        refused.
+    """
+    from bentwing.fleet.task import sentence_of
+
+    if not quiet:
+        wide = max(len(one.name) for one in site.recordings)
+        for one in site.recordings:
+            state = sentence_of(one.state, one.reason)
+            typer.echo(f"{one.name:<{wide}}  {state}{' (as before)' if one.is_earlier else ''}")
+        for group in site.groups or []:
+            alone = len(group.runs) == 1
+            state = "belongs to no other" if alone else sentence_of(group.state, group.reason)
+            typer.echo(f"{group.folder}: {', '.join(group.runs)}; {state}")
+        typer.echo(f"{site.out}: {_counted(site)}; open {site.out / 'index.html'}")
+    if site.is_complete:
+        return
+    bad = [one for one in site.recordings if not one.is_usable]
+    wrong = [one for one in site.groups or [] if one.state == "failed" and len(one.runs) > 1]
+    said = [
+        f"{one.name} ({sentence_of(one.state, one.reason)})" if quiet else one.name for one in bad
+    ]
+    problems = [
+        *(
+            [f"{len(bad)} of {len(site.recordings)} are not mapped: {', '.join(said)}"]
+            if bad
+            else []
+        ),
+        *([f"the runs were not merged: {site.failure}"] if site.failure else []),
+        *(f"{one.folder}: {sentence_of(one.state, one.reason)}" for one in wrong),
+    ]
+    msg = f"{'; '.join(problems)}; open {site.out / 'index.html'}"
+    if len(bad) < len(site.recordings):
+        raise PartialError(msg)
+    raise (EstimationError if any(one.state == "failed" for one in bad) else InputError)(msg)
+
+
+def _counted(site: Site) -> str:
+    states = [one.state for one in site.recordings]
+    return ", ".join(f"{states.count(state)} {state}" for state in dict.fromkeys(states))
 
 
 def _require(results: list[tuple[Path, Verdict]]) -> None:

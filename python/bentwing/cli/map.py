@@ -13,6 +13,7 @@ EXAMPLES = (
     "bentwing map recording.bag -p payload.yaml -o run",
     "bentwing map recording.bag -p payload.yaml -o run --start 60 --duration 30",
     "bentwing map part1.bag part2.bag -p payload.yaml -o run --map-spacing 0.02",
+    "bentwing map flights -p payload.yaml -o runs",
     "bentwing map --print-settings -p payload.yaml > settings.yaml",
     "bentwing map recording.bag -o run --settings settings.yaml --set window=4",
 )
@@ -70,13 +71,14 @@ def command(
     """Turn a recording into a trajectory, a map and a report.
 
     Several parts of one recording are mapped as one; recordings of several flights are mapped one by
-    one and merged.
+    one and merged. The recordings in a folder are mapped each into a folder of its own.
     """
     # slow to import, so only when it is needed
     from bentwing.base.errors import UsageError
     from bentwing.base.progress import create_progress
-    from bentwing.cli.done import say_maps, say_run
+    from bentwing.cli.done import say_maps, say_run, say_site
     from bentwing.closing.loop_file import read_loops
+    from bentwing.recording.containers.source import is_folder_of_recordings
     from bentwing.recording.flights import flights_of
     from bentwing.recording.sections.project import Project
     from bentwing.run.choose import choose, given
@@ -112,6 +114,19 @@ def command(
     if write_payload is not None:
         require_new(write_payload)
     progress = create_progress(quiet=quiet)
+    if any(map(is_folder_of_recordings, recording)):
+        from bentwing.fleet.opened import side_by_side
+        from bentwing.fleet.plan import Choice
+        from bentwing.fleet.site import map_site
+
+        of_one = {"--write-payload": write_payload, "--loops": loops, "--gnss": gnss}
+        for name in (name for name, file in of_one.items() if file is not None):
+            msg = f"{name} with a folder of recordings: give it with one recording"
+            raise UsageError(msg)
+        choice = Choice(settings, tuple(set_), payload, options_given)
+        opened = side_by_side(threads, progress)
+        say_site(map_site(recording, out, choice, opened, progress, merges=False), quiet=quiet)
+        return
     flights = flights_of(recording) if len(recording) > 1 else [recording]
     if len(flights) > 1:
         from bentwing.run.flights import map_flights

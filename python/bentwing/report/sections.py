@@ -27,7 +27,7 @@ Row = tuple[str, ...]
 _PAUSE = 1.0  # s without a pose: there one run ends and the next begins
 
 # A sign each, for those who do not see the colours apart.
-_SIGNS = {"good": "\N{CHECK MARK}", "warn": "!", "bad": "\N{MULTIPLICATION X}"}
+SIGNS = {"good": "\N{CHECK MARK}", "warn": "!", "bad": "\N{MULTIPLICATION X}"}
 DASH, TIMES, MINUS = "\N{EN DASH}", "\N{MULTIPLICATION SIGN}", "\N{MINUS SIGN}"
 _BEFORE_UNIT = re.compile(r"(?<=\d) (?=(?:mm|m|%|s)\b)")
 
@@ -52,7 +52,7 @@ def verdict(record: Mapping[str, Any], texts: Texts = ENGLISH) -> str:
         items = "".join(f"<li>{escape(warning)}</li>" for warning in warnings)
         listed += f"<p>{texts.worth_knowing}</p><ul>{items}</ul>"
     said = f"<p>{escape(sentence)}</p>" if sentence else ""
-    return f'<div class="verdict {level}"><strong>{_SIGNS[level]} {escape(headline)}</strong>{said}{listed}</div>'
+    return f'<div class="verdict {level}"><strong>{SIGNS[level]} {escape(headline)}</strong>{said}{listed}</div>'
 
 
 def _set_up(findings: Sequence[Mapping[str, Any]]) -> str:

@@ -29,6 +29,7 @@ from bentwing.calibrate.set_up import SetUp
 from bentwing.closing.beams import FoundBeams
 from bentwing.evaluate.verdict import Evidence
 from bentwing.run.found import Found, Reading, Spin
+from bentwing.run.request import deciding
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -42,8 +43,6 @@ _COVARIANCES = ("covariance_times", "covariance_matrices")
 _SHORT = "short_variances"
 _OF_ESTIMATE = ("windows", "counts", "timings", "health", "notes", "breaks", "segments")
 _CORRECTIONS = ("localization", "loop_closure", "merging")
-# What must be the same for a run to go on; the number of threads and names in the report change no bit.
-_FREE = frozenset({"threads", "project"})
 STAGES = ("estimate", "loops")
 _DIGEST = hashlib.sha256().digest_size
 # What reading something that bentwing has not written ends in.
@@ -161,8 +160,8 @@ class Checkpoint:
             files.remove(NAME)
 
     def _asked(self) -> dict[str, Any]:
-        settings = {k: v for k, v in self._settings.to_json().items() if k not in _FREE}
-        asked: dict[str, Any] = plain({**settings, "inputs": self._folder.record.inputs})
+        inputs = self._folder.record.inputs
+        asked: dict[str, Any] = plain({**deciding(self._settings), "inputs": inputs})
         return asked
 
     def _require_same(self, asked: object) -> None:

@@ -9,18 +9,19 @@ from typing import TYPE_CHECKING
 from bentwing.base.errors import UsageError
 from bentwing.base.progress import Progress, as_progress
 from bentwing.base.regular_file import resolved
-from bentwing.base.run_record import read_record
 from bentwing.run.check import opened
 from bentwing.run.folder import RunFolder
 from bentwing.run.merging import merge_into, open_sources
 from bentwing.run.merging.source import distinct_names
 from bentwing.run.pipeline import run_recording
-from bentwing.run.settings import RunSettings, merge_settings
+from bentwing.run.request import inputs_of, record_of_request, request_of
+from bentwing.run.settings import merge_settings
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from bentwing.run.merging import Merged
+    from bentwing.run.settings import RunSettings
 
 RUNS = "runs"
 """Folder of the flights' own runs in that of the merged map."""
@@ -79,7 +80,7 @@ def map_flights(
         runs = [folder.path / RUNS / name for name in names]
         mapped: list[str] = []
         for name, run, paths in zip(names, runs, flights, strict=True):
-            if resume and _is_mapped(run, paths, settings):
+            if resume and _is_mapped(run, paths, settings, payload_file):
                 shown.note(f"{name}: is mapped already")
                 continue
             shown.note(f"{name}:")
@@ -97,20 +98,9 @@ def flight_names(flights: Sequence[Sequence[Path]]) -> list[str]:
     return distinct_names(stems)
 
 
-def _is_mapped(run: Path, paths: Sequence[Path], settings: RunSettings) -> bool:
+def _is_mapped(
+    run: Path, paths: Sequence[Path], settings: RunSettings, payload_file: Path | str | None
+) -> bool:
     """Whether a folder holds the complete run of a flight, made in the same way."""
-    try:
-        record = read_record(run)
-    except UsageError:
-        return False
-    # Where the head had to be found, the run has another payload than was asked for.
-    free = {"threads", "project", *(["payload"] if record.get("set_up") else [])}
-    used, wanted = (
-        {name: value for name, value in described.items() if name not in free}
-        for described in (record.get("settings") or {}, settings.to_json())
-    )
-    return (
-        bool(record.get("complete"))
-        and record.get("recordings") == [str(resolved(path)) for path in paths]
-        and used == wanted
-    )
+    read = [*paths, *([] if payload_file is None else [Path(payload_file)])]
+    return record_of_request(run, request_of(settings, inputs_of(read)), paths) is not None

@@ -22,6 +22,7 @@ from bentwing.run.choose import as_run_settings
 from bentwing.run.estimate import estimate
 from bentwing.run.folder import RunFolder
 from bentwing.run.report import report_failure, report_run, say_warnings
+from bentwing.run.request import request_of
 from bentwing.run.run import COVARIANCES, Run
 
 if TYPE_CHECKING:
@@ -144,7 +145,7 @@ def run_recording(
     """
     watch = as_progress(progress)
     read = [path for path in (settings.prior_map, payload_file) if path is not None]
-    settings = _placed(paths, settings)
+    asked, settings = settings, _placed(paths, settings)
     # Refuses at once what the estimator cannot do.
     odometry.create(settings.estimator, settings.payload, settings.of_estimator, settings.threads)
     with (
@@ -156,6 +157,7 @@ def run_recording(
         job = stages.Job(head.part, folder, head.settings, watch)
         with _reported(folder, watch):
             job = replace(job, prior=_open_inputs(job, payload_file))
+            folder.record.request = request_of(asked, folder.record.inputs)
             checkpoint = Checkpoint(folder, settings)
             done, found = checkpoint.restore(resume=resume)
             folder.remove_earlier()

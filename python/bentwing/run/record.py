@@ -30,6 +30,7 @@ class RunRecord:
     Attributes
     ----------
     settings : what decides the run, in plain JSON types
+    request : SHA-256 of what was asked for, by which a run that need not be made again is told
     complete : whether all stages are done
     stage : the one that is under way, or in which the run ended
     reason : why it ended early
@@ -44,6 +45,7 @@ class RunRecord:
     """
 
     settings: dict[str, Any] = field(default_factory=dict)
+    request: str | None = None
     complete: bool = False
     stage: str = "start"
     reason: str | None = None
@@ -93,6 +95,7 @@ class RunRecord:
                 "versions": versions(),
                 "command": sys.argv,
                 "settings": self.settings,
+                "request": self.request,
                 "inputs": self.inputs,
                 "recordings": self.recordings,
                 "start_ns": self.start_ns,

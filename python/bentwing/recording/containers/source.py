@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
 PCAP_SUFFIXES = (".pcap", ".pcapng")
 SUFFIXES = (".bag", ".mcap", ".db3", *PCAP_SUFFIXES)
+_METADATA = "metadata.yaml"
 _MOST_OF_METADATA = 2**24  # bytes
 EXPECTED = "give a ROS 1 .bag, a ROS 2 bag folder, a .db3, a .mcap or a .pcap file"
 
@@ -118,7 +119,7 @@ def _require_magic(path: Path, magic: bytes) -> None:
 
 
 def _require_described(path: Path) -> None:
-    described = path / "metadata.yaml"
+    described = path / _METADATA
     if described.is_file() and (size := described.stat().st_size) > _MOST_OF_METADATA:
         msg = f"metadata.yaml of {size} bytes"
         raise ValueError(msg)
@@ -199,14 +200,23 @@ def _files(path: Path) -> list[Path]:
         raise RecordingError(msg)
     if not path.is_dir():
         return [path]
-    if (path / "metadata.yaml").exists():
+    if (path / _METADATA).exists():
         return [path]
-    # The recorder writes metadata.yaml last, so a crash leaves a folder without one.
-    files = sorted(file for file in path.iterdir() if file.suffix in (".mcap", ".db3"))
+    # The recorder writes it last, so a crash leaves a folder without one.
+    files = _ros2_files(path)
     if not files:
         msg = f"{path}: a folder without metadata.yaml and without .mcap or .db3 files; {EXPECTED}"
         raise RecordingError(msg)
     return files
+
+
+def is_folder_of_recordings(path: Path) -> bool:
+    """Whether a path is a folder, and not one that is a recording itself."""
+    return path.is_dir() and not (path / _METADATA).exists() and not _ros2_files(path)
+
+
+def _ros2_files(folder: Path) -> list[Path]:
+    return sorted(file for file in folder.iterdir() if file.suffix in (".mcap", ".db3"))
 
 
 def _open_one(path: Path) -> Source:

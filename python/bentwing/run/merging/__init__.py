@@ -7,8 +7,26 @@ parts that nothing links are reported as separate.
 
 from __future__ import annotations
 
-from bentwing.run.merging.maps import MergedMap
-from bentwing.run.merging.runs import Merged, merge, merge_into
+from bentwing.run.merging.maps import MergedMap, describe_map, make_map
+from bentwing.run.merging.runs import (
+    Merged,
+    budget_of,
+    find_groups,
+    merge,
+    merge_into,
+    settled,
+)
 from bentwing.run.merging.source import open_sources
 
-__all__ = ["Merged", "MergedMap", "merge", "merge_into", "open_sources"]
+__all__ = [
+    "Merged",
+    "MergedMap",
+    "budget_of",
+    "describe_map",
+    "find_groups",
+    "make_map",
+    "merge",
+    "merge_into",
+    "open_sources",
+    "settled",
+]

@@ -82,11 +82,11 @@ def make_maps(folder: RunFolder, groups: Sequence[Placed], found: Ingredients) -
     if len(groups) > 1:
         maps = _separate_maps(folder, groups, found)
     else:
-        maps = [_one_map(folder, groups[0], found, _describe(".", groups[0], found))]
+        maps = [_one_map(folder, groups[0], found, describe_map(".", groups[0], found))]
     return maps
 
 
-def _describe(where: str, group: Placed, found: Ingredients) -> dict[str, Any]:
+def describe_map(where: str, group: Placed, found: Ingredients) -> dict[str, Any]:
     """Say what a map consists of."""
     links = [m for m in found.matches if m.believed and m.a in group.trajectories]
     return {
@@ -117,17 +117,39 @@ def _warnings(group: Placed, found: Ingredients) -> list[str]:
     return told
 
 
+def make_map(
+    out: Path,
+    group: Placed,
+    found: Ingredients,
+    described: dict[str, Any],
+    settings: dict[str, Any],
+    *,
+    request: str | None = None,
+) -> MergedMap:
+    """Make the map of one group, in a folder of its own.
+
+    Parameters
+    ----------
+    described : what `describe_map` says
+    settings : in plain JSON types, for run.json
+    request : SHA-256 of what was asked, by which the map can be told again
+    """
+    with RunFolder(out, settings) as folder:
+        folder.record.request = request
+        sources = [found.sources[n] for n in _numbers(group)]
+        folder.add_inputs([path for source in sources for path in source.recordings])
+        return _one_map(folder, group, found, described)
+
+
 def _separate_maps(
     folder: RunFolder, groups: Sequence[Placed], found: Ingredients
 ) -> list[MergedMap]:
     maps, described = [], []
     for number, group in enumerate(groups, start=1):
-        one = _describe(f"map_{number}", group, found)
+        one = describe_map(f"map_{number}", group, found)
         described.append(one)
-        with RunFolder(folder.path / one["folder"], folder.record.settings) as own:
-            sources = [found.sources[n] for n in _numbers(group)]
-            own.add_inputs([path for source in sources for path in source.recordings])
-            maps.append(_one_map(own, group, found, one))
+        out = folder.path / one["folder"]
+        maps.append(make_map(out, group, found, one, folder.record.settings))
     told = ", ".join(f"{one['folder']} ({', '.join(one['runs'])})" for one in described)
     note = (
         "bentwing did not recognize common places of all runs: they are "

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,8 +29,10 @@ from bentwing.run.merging.source import Source, open_sources
 from bentwing.run.settings import merge_settings
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Mapping, Sequence
+    from collections.abc import Callable, Collection, Mapping, Sequence
+    from contextlib import AbstractContextManager
 
+    from bentwing.closing.joining.placing import Placed
     from bentwing.recording.sections.project import Project
     from bentwing.run.settings import MergeSettings
 
@@ -101,14 +103,7 @@ def merge(
     )
     require_coordinates(settings.georeferencing)
     sources = open_sources([Path(run) for run in runs])
-    wanted = settings_of_runs(settings.georeferencing, sources)
-    named = settings.project or next((s.project for s in sources if s.project is not None), None)
-    settings = settings.model_copy(update={"georeferencing": wanted, "project": named})
-    is_placed = any(
-        source.payload.gnss is not None or source.georeferencing.fixes is not None
-        for source in sources
-    )
-    require_effect(wanted, "these runs", is_placed=is_placed)
+    settings = settled(settings, sources)
     if any(resolved(Path(out)) == resolved(source.folder) for source in sources):
         msg = (
             f"{out}: is one of the runs that are to be merged; choose another folder for the result"
@@ -116,6 +111,24 @@ def merge(
         raise UsageError(msg)
     with RunFolder(Path(out), settings.to_json()) as folder:
         return merge_into(folder, sources, settings, as_progress(progress))
+
+
+def settled(settings: MergeSettings, sources: Sequence[Source]) -> MergeSettings:
+    """Return the settings of a merging with what its runs agree on, where it was not given.
+
+    Raises
+    ------
+    UsageError
+        If coordinates are asked for that nothing in the runs can give.
+    """
+    wanted = settings_of_runs(settings.georeferencing, sources)
+    named = settings.project or next((s.project for s in sources if s.project is not None), None)
+    is_placed = any(
+        source.payload.gnss is not None or source.georeferencing.fixes is not None
+        for source in sources
+    )
+    require_effect(wanted, "these runs", is_placed=is_placed)
+    return settings.model_copy(update={"georeferencing": wanted, "project": named})
 
 
 def merge_into(
@@ -133,10 +146,34 @@ def merge_into(
     """
     with folder.stage("inputs"):
         folder.add_inputs([path for source in sources for path in source.recordings])
-    with folder.stage("survey"):
+    groups, found = find_groups(sources, settings, progress, folder.stage)
+    folder.record.found = Found(merging={**found.record, "maps": []})
+    folder.save()
+    told = {warning for source in sources if source.name in said for warning in source.told}
+    maps = make_maps(folder, groups, replace(found, said=told))
+    return Merged(folder.path, maps, folder.record.found.merging or {})
+
+
+def find_groups(
+    sources: list[Source],
+    settings: MergeSettings,
+    progress: Progress,
+    stage: Callable[[str], AbstractContextManager[None]],
+) -> tuple[list[Placed], Ingredients]:
+    """Find which runs have places in common, and where these put them.
+
+    Parameters
+    ----------
+    stage : called with the name of each step, times it
+
+    Returns
+    -------
+    The groups of runs, and what their maps are made of.
+    """
+    with stage("survey"):
         surveys = _surveyed(sources, settings, progress)
     parts = parts_of(surveys)
-    with folder.stage("match"), progress.stage("match", _n_pairs(len(parts)), "pairs") as shown:
+    with stage("match"), progress.stage("match", _n_pairs(len(parts)), "pairs") as shown:
         matches = find_matches(parts, shown)
     trajectories = {
         Part(r, s): stretches.trajectory
@@ -144,7 +181,7 @@ def merge_into(
         for s, stretches in enumerate(one.recorded.segments)
     }
     ties = [(part, Part(part.run, part.segment + 1)) for part in parts]
-    with folder.stage("place"):
+    with stage("place"):
         groups, matches = place_groups(
             trajectories, parts, matches, [tie for tie in ties if tie[1] in parts]
         )
@@ -153,22 +190,23 @@ def merge_into(
         "parts": describe_parts_of(names, parts),
         "candidates": describe_matches(names, matches),
     }
-    folder.record.found = Found(merging={**record, "maps": []})
-    folder.save()
-    told = {warning for source in sources if source.name in said for warning in source.told}
-    found = Ingredients(sources, surveys, matches, record, settings, progress, told)
-    return Merged(folder.path, make_maps(folder, groups, found), folder.record.found.merging or {})
+    return groups, Ingredients(sources, surveys, matches, record, settings, progress)
 
 
 def _n_pairs(n: int) -> float:
     return n * (n - 1) / 2
 
 
+def budget_of(sources: Sequence[Source], settings: MergeSettings) -> Budget:
+    """Return what the registration of all runs holds in memory; it decides how dense their surfels are."""
+    seconds = sum(length_of(source.estimate) for source in sources)
+    return Budget.of(seconds, settings.loop_closure)
+
+
 def _surveyed(
     sources: Sequence[Source], settings: MergeSettings, progress: Progress
 ) -> list[Survey]:
-    seconds = sum(length_of(source.estimate) for source in sources)
-    budget = Budget.of(seconds, settings.loop_closure)
+    budget = budget_of(sources, settings)
     progress.note(f"merging: {budget.sentence()}")
     surveys = []
     for source in sources:

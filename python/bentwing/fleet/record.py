@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""What came of many recordings, as a value and as site.json says it."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from bentwing.base.regular_file import resolved
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+    from bentwing.fleet.groups import Group
+    from bentwing.fleet.task import Mapped
+
+
+@dataclass(frozen=True, slots=True)
+class Site:
+    """Many recordings, mapped.
+
+    Attributes
+    ----------
+    out : the folder
+    recordings : what came of each, in the order given
+    groups : runs in one frame each, the merged ones first; None where nothing was merged
+    failure : why there are no merged maps, empty where there are
+    places : what the merging compared, as in run.json
+    """
+
+    out: Path
+    recordings: list[Mapped]
+    groups: list[Group] | None = None
+    failure: str = ""
+    places: Mapping[str, Any] | None = None
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether every recording has a map that is not wrong, and the merging did not fail."""
+        maps = [one.state for one in self.groups or []]
+        return (
+            all(one.is_usable for one in self.recordings)
+            and not self.failure
+            and "failed" not in maps
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """Return what site.json says; folders are relative to the site."""
+        groups = self.groups
+        return {
+            "recordings": [_recording(one, self.out) for one in self.recordings],
+            "groups": None if groups is None else [_group(one, self.out) for one in groups],
+            "failure": self.failure or None,
+            "places": self.places,
+        }
+
+
+def _recording(one: Mapped, out: Path) -> dict[str, Any]:
+    return {
+        "name": one.name,
+        "state": one.state,
+        "reason": one.reason or None,
+        "folder": _inside(one.folder, out),
+        "request": one.request or None,
+        "seconds": one.seconds,
+        "points": one.points,
+        "is_earlier": one.is_earlier,
+    }
+
+
+def _group(one: Group, out: Path) -> dict[str, Any]:
+    return {
+        "runs": list(one.runs),
+        "folder": _inside(one.folder, out),
+        "state": one.state,
+        "reason": one.reason or None,
+        "n_links": one.n_links,
+        "is_earlier": one.is_earlier,
+    }
+
+
+def _inside(folder: Path | None, out: Path) -> str | None:
+    if folder is None:
+        return None
+    return os.path.relpath(resolved(folder), resolved(out)).replace(os.sep, "/")

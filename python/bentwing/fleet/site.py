@@ -1,0 +1,199 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""Many recordings into one folder of runs, and into merged maps: the whole on one screen."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from bentwing.base.progress import Progress, as_progress
+from bentwing.base.regular_file import resolved
+from bentwing.base.result_folder import ResultFolder
+from bentwing.closing.global_registration import Budget
+from bentwing.evaluate.verdict import Verdict
+from bentwing.fleet.discover import find_recordings
+from bentwing.fleet.folder import GROUPS, PAGE, RECORDINGS, SITE_FOLDER
+from bentwing.fleet.groups import Group, finished_merging, merge_runs, merge_task
+from bentwing.fleet.manifest import MANIFEST_SUFFIXES, read_manifest
+from bentwing.fleet.memory import process_mb
+from bentwing.fleet.opened import LazyPool, on_cluster
+from bentwing.fleet.plan import Choice, plan
+from bentwing.fleet.pool import Job
+from bentwing.fleet.record import Site
+from bentwing.fleet.task import Mapped, finished, map_recording_of, reason_of, sentence_of
+from bentwing.report.site import write_site_page
+from bentwing.run.settings import merge_settings
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    from bentwing.fleet.entry import Entry
+    from bentwing.fleet.opened import Opened
+    from bentwing.fleet.task import MapTask
+    from bentwing.map import MapFormat
+    from bentwing.odometry import EstimatorName
+
+
+def map_fleet(
+    recordings: Path | str | Sequence[Path | str],
+    out: Path | str,
+    *,
+    payload: Path | str | None = None,
+    settings: Path | str | None = None,
+    estimator: EstimatorName | None = None,
+    map_format: MapFormat | None = None,
+    map_spacing: float | None = None,
+    threads: int | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    client: Any = None,  # noqa: ANN401 - of dask.distributed, which may not be installed
+    progress: Progress | None = None,
+) -> Site:
+    """Map many recordings on a cluster of dask.distributed, and merge those that belong together.
+
+    What an earlier call has finished in the same way is left as it is: same inputs, settings and
+    version. A recording that cannot be mapped does not stop the others.
+
+    Parameters
+    ----------
+    recordings : a manifest, or folders of recordings
+    out : folder of the result
+    payload : description of the head of recordings that have none of their own
+    settings : YAML file of what `bentwing map --print-settings` prints, all or some of it
+    estimator, map_format, map_spacing : as `map_recording` takes them
+    threads : of each recording; default: on this machine its cores among the workers
+    workers : of a cluster that is started on this machine; default: two where memory allows
+    scheduler : address of a running one instead; default: the environment's DASK_ADDRESS
+    client : of dask.distributed, to be used instead
+    progress : what to tell the user meanwhile; default: nothing
+
+    Raises
+    ------
+    UsageError, InputError
+        If the list of recordings cannot be read, or there is no cluster.
+    """
+    from bentwing.run.choose import given
+
+    options = given(
+        estimator=estimator, map_format=map_format, map_spacing=map_spacing, threads=threads
+    )
+    given_paths = [recordings] if isinstance(recordings, (str, Path)) else list(recordings)
+    choice = Choice(
+        None if settings is None else Path(settings),
+        (),
+        None if payload is None else Path(payload),
+        options,
+    )
+    shown = as_progress(progress)
+    opened = on_cluster(threads, shown, workers=workers, scheduler=scheduler, client=client)
+    return map_site([Path(path) for path in given_paths], Path(out), choice, opened, shown)
+
+
+def map_site(
+    paths: Sequence[Path],
+    out: Path,
+    choice: Choice,
+    opened: Opened,
+    progress: Progress,
+    *,
+    merges: bool = True,
+) -> Site:
+    """Map the recordings that paths list or hold, each into a folder of its own; see `map_fleet`.
+
+    Parameters
+    ----------
+    opened : opens the pool that the work runs in, once there is some
+    merges : whether the runs are merged; then they are in a sub-folder of `out`, else in `out` itself
+    """
+    entries, manifests = _entries(paths)
+    choice.settings()  # what is wrong with all of them is no matter of one
+    runs = out / RECORDINGS if merges else out
+    read = [*manifests, *(part for entry in entries for part in entry.parts)]
+    with ResultFolder(out, SITE_FOLDER, read) as folder, ExitStack() as stack:
+        runs.mkdir(exist_ok=True)
+        tasks, refused = plan(entries, resolved(runs), choice)
+        pool = LazyPool(opened, stack)
+        mapped = {one.name: one for one in [*refused, *_map(tasks, pool, progress)]}
+        site = Site(out, [mapped[entry.name] for entry in entries])
+        if merges:
+            site = _merged(site, choice, pool)
+        record = site.to_json()
+        write_site_page(folder.file(PAGE), record)
+        folder.complete(manifests, record)
+    return site
+
+
+def _entries(paths: Sequence[Path]) -> tuple[list[Entry], list[Path]]:
+    """Return the recordings and the manifests that list them."""
+    if len(paths) == 1 and paths[0].suffix in MANIFEST_SUFFIXES and not paths[0].is_dir():
+        return read_manifest(paths[0]), [paths[0]]
+    return find_recordings(paths), []
+
+
+def _map(tasks: Sequence[MapTask], pool: LazyPool, progress: Progress) -> Iterator[Mapped]:
+    """Yield what came of each recording, those first that are there already."""
+    todo = []
+    for task in tasks:
+        done = finished(task)
+        if done is None:
+            todo.append(Job(task.key, map_recording_of, task, task.megabytes))
+        else:
+            yield done
+    if len(todo) < len(tasks):
+        progress.note(f"{len(tasks) - len(todo)} of {len(tasks)} recordings are mapped already")
+    for number, (job, result) in enumerate(pool.results(todo), start=1):
+        one = _of_result(job.task, result)
+        progress.note(f"[{number}/{len(todo)}] {one.name}: {sentence_of(one.state, one.reason)}")
+        yield one
+
+
+def _of_result(task: MapTask, result: Mapped | BaseException) -> Mapped:
+    """Return what came of a recording; raise what is no matter of one."""
+    if isinstance(result, Mapped):
+        return result
+    if not isinstance(result, Exception):
+        raise result
+    reason = str(result) or type(result).__name__
+    return Mapped(task.name, "failed", reason, request=task.request)
+
+
+def _merged(site: Site, choice: Choice, pool: LazyPool) -> Site:
+    """Merge the runs that can be used."""
+    usable = [one for one in site.recordings if one.is_usable]
+    alone = [Group((one.name,), one.folder or site.out, one.state, one.reason) for one in usable]
+    if len(usable) < 2:
+        return replace(site, groups=alone)
+    settings = choice.settings()
+    named = ("map_format", "map_spacing", "cleaning", "refine", "georeferencing", "project")
+    wanted = {name: getattr(settings, name) for name in settings.model_fields_set & {*named}}
+    merging = merge_settings(**wanted, loop_closure=settings.closing)
+    budget = Budget.of(sum(one.seconds for one in usable), merging.loop_closure)
+    task = merge_task(resolved(site.out) / GROUPS, usable, merging, process_mb(budget.megabytes))
+    answer = finished_merging(task)
+    if answer is None:
+        ((_, answer),) = pool.results([Job(task.key, merge_runs, task, task.megabytes)])
+    if isinstance(answer, BaseException):
+        answer = {"failed": str(answer) or type(answer).__name__}
+    if "failed" in answer:
+        return replace(site, groups=alone, failure=answer["failed"])
+    by_name = {group.runs[0]: group for group in alone}
+    groups = [
+        by_name[one["runs"][0]] if one["folder"] is None else _group(task.place, one)
+        for one in answer["groups"]
+    ]
+    groups.sort(key=lambda group: len(group.runs) == 1)
+    return replace(site, groups=groups, places=answer["places"])
+
+
+def _group(place: Path, answer: Mapping[str, Any]) -> Group:
+    verdict = Verdict.from_json(answer["verdict"])
+    return Group(
+        tuple(answer["runs"]),
+        place / answer["folder"],
+        verdict.state,
+        reason_of(verdict),
+        answer["n_links"],
+        answer["is_earlier"],
+    )

@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""What is to be done for one recording, and what came of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, Literal
+
+from bentwing.base.errors import BentwingError, UsageError
+from bentwing.base.provenance import bentwing_version
+from bentwing.base.run_record import RUN_FOLDER, understood
+from bentwing.fleet.folder import publish, require_run_or_nothing, staging_of
+from bentwing.fleet.process import Processes, run_unless_done
+from bentwing.run.request import record_of_request
+from bentwing.run.run import verdict_in
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+    from bentwing.evaluate.verdict import Verdict
+
+State = Literal["good", "doubtful", "failed", "refused"]
+
+
+@dataclass(frozen=True, slots=True)
+class MapTask:
+    """A recording that is to be mapped into a folder.
+
+    Attributes
+    ----------
+    name : of the recording
+    place : of its run folder
+    recordings : files that are one recording
+    payload : file that the head was read from
+    settings : YAML
+    request : SHA-256 of inputs, settings and version
+    megabytes : of memory that mapping it takes
+    version : of bentwing, that this process has
+    """
+
+    name: str
+    place: Path
+    recordings: tuple[Path, ...]
+    payload: Path | None
+    settings: str
+    request: str
+    megabytes: float
+    version: str = field(default_factory=bentwing_version)
+
+    @property
+    def key(self) -> str:
+        """Name of the work, by its content."""
+        return f"map-{self.name}-{self.request}"
+
+
+@dataclass(frozen=True, slots=True)
+class Mapped:
+    """What came of a recording.
+
+    Attributes
+    ----------
+    name : of the recording
+    state : `good`, `doubtful` and `failed` by the verdict; `failed` also without a map; `refused` where
+        it cannot be mapped as it is
+    reason : why it is not good
+    folder : its run folder, None where there is none
+    request : SHA-256 of what was asked
+    seconds : of recording
+    points : in the map
+    is_earlier : whether it was there already
+    """
+
+    name: str
+    state: State
+    reason: str = ""
+    folder: Path | None = None
+    request: str = ""
+    seconds: float = 0.0
+    points: int = 0
+    is_earlier: bool = False
+
+    @property
+    def is_usable(self) -> bool:
+        """Whether there is a map that is not wrong."""
+        return self.state in {"good", "doubtful"}
+
+
+def finished(task: MapTask) -> Mapped | None:
+    """Return what came of a recording if its run is there, made in the same way."""
+    record = record_of_request(task.place, task.request, task.recordings)
+    return None if record is None else replace(_mapped(task, record), is_earlier=True)
+
+
+def map_recording_of(
+    task: MapTask, threads: int | None, processes: Processes | None = None
+) -> Mapped:
+    """Map a recording in a process of its own, and give the run its name.
+
+    Raises
+    ------
+    ProcessDiedError
+        If it ended without an answer: it may be worth another try.
+    """
+    try:
+        return _made(task, threads, processes)
+    except BentwingError as error:
+        return Mapped(task.name, "refused", str(error), request=task.request)
+
+
+def _made(task: MapTask, threads: int | None, processes: Processes | None) -> Mapped:
+    if task.version != bentwing_version():
+        msg = f"this worker has bentwing {bentwing_version()}, the client has {task.version}; install the same"
+        raise UsageError(msg)
+    require_run_or_nothing(task.place)
+    staging = staging_of(task.place, task.request)
+    order = {
+        "recordings": task.recordings, "payload": task.payload, "settings": task.settings,
+        "threads": threads, "out": staging,
+    }  # fmt: skip
+    answer = run_unless_done("map", order, task.name, processes, lambda: finished(task))
+    if isinstance(answer, Mapped):
+        return answer
+    folder = None
+    if RUN_FOLDER.read(staging) is not None:
+        publish(staging, task.place)
+        folder = task.place
+    if "failed" in answer:
+        return Mapped(task.name, "failed", answer["failed"], folder, task.request)
+    if "refused" in answer:
+        return Mapped(task.name, "refused", answer["refused"], folder, task.request)
+    return _mapped(task, RUN_FOLDER.read(task.place) or {})
+
+
+def _mapped(task: MapTask, record: Mapping[str, Any]) -> Mapped:
+    with understood(task.place):
+        verdict = verdict_in(record)
+        return Mapped(
+            task.name,
+            verdict.state,
+            reason_of(verdict),
+            task.place,
+            task.request,
+            float(sum(last - first for first, last in record.get("segments") or [])),
+            int((record.get("counts") or {}).get("map.written", 0)),
+        )
+
+
+def reason_of(verdict: Verdict) -> str:
+    """Return why a result is not good, empty where it is."""
+    return "" if verdict.state == "good" else verdict.sentence().partition(": ")[2]
+
+
+def sentence_of(state: str, reason: str) -> str:
+    """Return what is said of a result."""
+    return f"{state}: {reason}" if reason else state

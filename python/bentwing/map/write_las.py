@@ -3,20 +3,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import laspy
 import numpy as np
-from laspy.vlrs.known import WktCoordinateSystemVlr
+from laspy.vlrs.known import LasZipVlr, WktCoordinateSystemVlr
 
 from bentwing import _core
-from bentwing.map.compress_laz import LazBackend
 from bentwing.map.gps_time import adjusted_gps_origin
 from bentwing.map.writer import MapWriter, round_offset
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from numpy.typing import NDArray
 
     from bentwing.map.chunk import MapChunk
@@ -48,20 +47,15 @@ class LasWriter(MapWriter):
     above 1 in the first chunk) are multiplied by 65,535.
     """
 
-    compressed = False
-
     def __init__(self, path: Path, clock_origin_ns: int, crs_wkt: str | None = None) -> None:
         super().__init__(path, clock_origin_ns, crs_wkt)
         self._gps_origin = adjusted_gps_origin(clock_origin_ns)
+        self._seen = _Seen()
 
     def _begin(self, first: MapChunk) -> None:
         self._announce(first)
-        self._writer = laspy.LasWriter(
-            self._temporary.open("wb"),
-            self._header,
-            do_compress=self.compressed,
-            laz_backend=LazBackend(self._temporary) if self.compressed else None,
-        )
+        self._file = self._temporary.open("wb")
+        self._header.write_to(self._file)
 
     def _announce(self, first: MapChunk) -> None:
         """Decide what the records have."""
@@ -69,9 +63,13 @@ class LasWriter(MapWriter):
         self._intensity_scale = _intensity_scale(first)
 
     def _append(self, chunk: MapChunk) -> None:
-        self._writer.write_points(
-            laspy.PackedPointRecord(self._records(chunk), self._header.point_format)
-        )
+        if len(chunk):
+            rows = self._records(chunk)
+            self._seen.add(rows)
+            self._put(rows)
+
+    def _put(self, rows: NDArray[np.void]) -> None:
+        self._file.write(rows.data)
 
     def _records(self, chunk: MapChunk) -> NDArray[np.void]:
         """Return the records (N,) of a chunk as the file has them."""
@@ -92,16 +90,73 @@ class LasWriter(MapWriter):
         return table
 
     def _finish(self) -> None:
-        self._writer.close()
+        with self._file:
+            self._seen.say(self._header, self.n_points)
+            write_again(self._header, self._file)
 
     def _abandon(self) -> None:
-        self._writer.close()
+        self._file.close()
 
 
 class LazWriter(LasWriter):
     """Writer of compressed LAZ."""
 
-    compressed = True
+    def _begin(self, first: MapChunk) -> None:
+        self._announce(first)
+        point_format = self._header.point_format
+        self._laz = _core.LazCompressor(point_format.id, point_format.num_extra_bytes)
+        self._file = self._temporary.open("wb")
+        begin_laz(self._laz, self._file, self._header)
+
+    def _put(self, rows: NDArray[np.void]) -> None:
+        self._laz.compress(rows.view(np.uint8))
+
+    def _finish(self) -> None:
+        self._laz.finish()
+        super()._finish()
+
+
+@dataclass
+class _Seen:
+    """Where and when the points are, in steps of the coordinates and s."""
+
+    low: NDArray[np.int64] = field(default_factory=lambda: np.zeros(3, np.int64))
+    high: NDArray[np.int64] = field(default_factory=lambda: np.zeros(3, np.int64))
+    first: float = np.inf
+    last: float = -np.inf
+
+    def add(self, rows: NDArray[np.void]) -> None:
+        low = np.array([rows[axis].min() for axis in "XYZ"], np.int64)
+        high = np.array([rows[axis].max() for axis in "XYZ"], np.int64)
+        is_first = self.first > self.last
+        self.low = low if is_first else np.minimum(self.low, low)
+        self.high = high if is_first else np.maximum(self.high, high)
+        self.first = min(self.first, float(rows["gps_time"].min()))
+        self.last = max(self.last, float(rows["gps_time"].max()))
+
+    def say(self, header: laspy.LasHeader, n_points: int) -> None:
+        """Write it into a header."""
+        header.point_count = n_points
+        header.number_of_points_by_return[0] = n_points
+        header.mins = self.low * SCALE + header.offsets
+        header.maxs = self.high * SCALE + header.offsets
+
+
+def begin_laz(laz: _core.LazCompressor, file: BinaryIO, header: laspy.LasHeader) -> int:
+    """Write the header of a compressed file; return where its points begin."""
+    header.vlrs.append(LasZipVlr(laz.record_data()))
+    header.are_points_compressed = True
+    header.write_to(file)
+    file.flush()
+    start = file.tell()
+    laz.begin(Path(file.name), start)
+    return start
+
+
+def write_again(header: laspy.LasHeader, file: BinaryIO) -> None:
+    """Write what the header says now over what it said at the beginning of the file."""
+    file.seek(0)
+    header.write_to(file, ensure_same_size=True)
 
 
 def _header(first: MapChunk, crs_wkt: str | None) -> laspy.LasHeader:

@@ -56,7 +56,7 @@ class CopcWriter(LasWriter):
         self._spool.close()
 
     def _write(self, file: io.BufferedRandom) -> None:
-        header, cube, n = self._header, Cube.around(self._seen.low, self._seen.high), self.n_points
+        header, cube, n = self._header, self._cube(), self.n_points
         point_format = header.point_format
         laz = _core.LazCompressor(point_format.id, point_format.num_extra_bytes, own_chunks=True)
         # The description of the tree has to be the first record; it is written again at the end.
@@ -78,6 +78,14 @@ class CopcWriter(LasWriter):
         header.vlrs[0] = _info(self._info(cube, (at + _EVLR.size, len(hierarchy))))
         self._seen.say(header, n)
         write_again(header, file)
+
+    def _cube(self) -> Cube:
+        """Return what the octree fills."""
+        ends = self._seen.ends
+        if not len(ends):
+            return Cube.around(np.zeros(3, np.int64), np.zeros(3, np.int64))
+        low, high = np.stack([ends[axis] for axis in "XYZ"], axis=1).astype(np.int64)
+        return Cube.around(low, high)
 
     def _compressed(
         self, laz: _core.LazCompressor, cube: Cube, n_points: int
@@ -127,7 +135,7 @@ class CopcWriter(LasWriter):
         """Return the description of the tree; `page` is where its nodes are listed, and how long that is."""
         edge = cube.edge * SCALE
         centre = self._header.offsets + cube.low * SCALE + 0.5 * edge
-        times = (self._seen.first, self._seen.last) if self.n_points else (0.0, 0.0)
+        times = self._seen.ends["gps_time"] if self.n_points else (0.0, 0.0)
         packed = struct.pack("<5d2Q2d", *centre, 0.5 * edge, edge / GRID, *page, *times)
         return packed.ljust(_INFO_SIZE, b"\0")
 

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
@@ -16,6 +15,8 @@ from bentwing.map.gps_time import adjusted_gps_origin
 from bentwing.map.writer import MapWriter, round_offset
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from numpy.typing import NDArray
 
     from bentwing.map.chunk import MapChunk
@@ -65,7 +66,7 @@ class LasWriter(MapWriter):
     def _append(self, chunk: MapChunk) -> None:
         if len(chunk):
             rows = self._records(chunk)
-            self._seen.add(rows)
+            self._seen.add(rows, self._header.point_format.extra_dimension_names)
             self._put(rows)
 
     def _put(self, rows: NDArray[np.void]) -> None:
@@ -116,30 +117,39 @@ class LazWriter(LasWriter):
         super()._finish()
 
 
-@dataclass
 class _Seen:
-    """Where and when the points are, in steps of the coordinates and s."""
+    """Between which ends the numbers of the records are.
 
-    low: NDArray[np.int64] = field(default_factory=lambda: np.zeros(3, np.int64))
-    high: NDArray[np.int64] = field(default_factory=lambda: np.zeros(3, np.int64))
-    first: float = np.inf
-    last: float = -np.inf
+    Attributes
+    ----------
+    ends : (2,) records with the least and the greatest of each number; (0,) before there are any
+    """
 
-    def add(self, rows: NDArray[np.void]) -> None:
-        low = np.array([rows[axis].min() for axis in "XYZ"], np.int64)
-        high = np.array([rows[axis].max() for axis in "XYZ"], np.int64)
-        is_first = self.first > self.last
-        self.low = low if is_first else np.minimum(self.low, low)
-        self.high = high if is_first else np.maximum(self.high, high)
-        self.first = min(self.first, float(rows["gps_time"].min()))
-        self.last = max(self.last, float(rows["gps_time"].max()))
+    def __init__(self) -> None:
+        self.ends = np.empty(0, np.void)
+
+    def add(self, rows: NDArray[np.void], extra: Iterable[str]) -> None:
+        """Take records (N,), at least one, with extra dimensions of these names."""
+        names = ("X", "Y", "Z", "gps_time", *extra)
+        ends = _ends_of(rows, names)
+        known = [self.ends, ends] if len(self.ends) else [ends]
+        self.ends = _ends_of(np.concatenate(known), names)
 
     def say(self, header: laspy.LasHeader, n_points: int) -> None:
-        """Write it into a header."""
+        """Write it into a header; laspy looks at the two ends in place of all records."""
+        header.update(laspy.PackedPointRecord(self.ends[:1], header.point_format))
+        if n_points:  # one by one, as of extra dimensions laspy sees the first record alone
+            header.grow(laspy.PackedPointRecord(self.ends[1:], header.point_format))
         header.point_count = n_points
         header.number_of_points_by_return[0] = n_points
-        header.mins = self.low * SCALE + header.offsets
-        header.maxs = self.high * SCALE + header.offsets
+
+
+def _ends_of(rows: NDArray[np.void], names: Iterable[str]) -> NDArray[np.void]:
+    ends = np.zeros(2, rows.dtype)
+    for name in names:
+        # what is not a number is no end, save where there is nothing else
+        ends[name] = np.fmin.reduce(rows[name]), np.fmax.reduce(rows[name])
+    return ends
 
 
 def begin_laz(laz: _core.LazCompressor, file: BinaryIO, header: laspy.LasHeader) -> int:

@@ -147,8 +147,9 @@ class _Seen:
 def _ends_of(rows: NDArray[np.void], names: Iterable[str]) -> NDArray[np.void]:
     ends = np.zeros(2, rows.dtype)
     for name in names:
+        values = np.ascontiguousarray(rows[name])
         # what is not a number is no end, save where there is nothing else
-        ends[name] = np.fmin.reduce(rows[name]), np.fmax.reduce(rows[name])
+        ends[name] = np.fmin.reduce(values), np.fmax.reduce(values)
     return ends
 
 

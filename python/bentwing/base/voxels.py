@@ -45,7 +45,11 @@ def unpack(keys: NDArray[np.int64]) -> NDArray[np.int64]:
 
 def voxel_keys(points: NDArray[np.float64], edge: float) -> NDArray[np.int64]:
     """Return the keys `(N,)` of the voxels of points `(N, 3)`."""
-    return pack(cells_of(points, edge))
+    keys = np.zeros(len(points), np.int64)
+    for values in points.T:  # one axis after the other stays in the cache
+        keys <<= _BITS
+        keys |= (np.floor(values / edge).astype(np.int64) + _HALF) & _MASK
+    return keys
 
 
 def column_keys(points: NDArray[np.float64], edge: float) -> NDArray[np.int64]:
@@ -53,11 +57,54 @@ def column_keys(points: NDArray[np.float64], edge: float) -> NDArray[np.int64]:
     return voxel_keys(points * np.array([1.0, 1.0, 0.0]), edge)
 
 
-def by_key(keys: NDArray[np.int64]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return the order `(N,)` that brings equal keys together, and where each of them begins in it."""
-    order = np.argsort(keys, kind="stable")
-    ordered = keys[order]
+def by_key(
+    keys: NDArray[np.int64], times: NDArray[np.float64] | None = None
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return the order `(N,)` that brings equal keys together, and where each of them begins in it.
+
+    Parameters
+    ----------
+    keys : (N,)
+    times : (N,) that order what has equal keys; default: the order in which they come
+    """
+    if times is not None and (times[1:] < times[:-1]).any():
+        earlier = np.argsort(times, kind="stable")
+        order, starts = by_key(keys[earlier])
+        return earlier[order], starts
+    n_bits = len(keys).bit_length()
+    narrow = _narrowed(keys, 63 - n_bits)
+    if narrow is None:
+        order = np.argsort(keys, kind="stable")
+        ordered = keys[order]
+    else:
+        # A key and its place in one number: to sort numbers takes a third of the time of sorting places.
+        ordered = narrow << n_bits | np.arange(len(keys))
+        ordered.sort()
+        order = ordered & ((1 << n_bits) - 1)
+        ordered >>= n_bits
     return order, np.flatnonzero(np.append(True, ordered[1:] != ordered[:-1])[: len(keys)])
+
+
+def _narrowed(keys: NDArray[np.int64], n_bits: int) -> NDArray[np.int64] | None:
+    """Return numbers from 0 in the order of the keys, or None if they need more bits."""
+    if not len(keys):
+        return keys
+    low, high = int(keys.min()), int(keys.max())
+    if high - low < 1 << n_bits:
+        return keys - low
+    if low < 0:  # no voxels'
+        return None
+    narrow, n = np.zeros_like(keys), 1
+    for shift in (2 * _BITS, _BITS, 0):
+        axis = (keys >> shift) & _MASK
+        first = axis.min()
+        size = int(axis.max() - first) + 1
+        narrow *= size
+        narrow += axis - first
+        n *= size
+        if n > 1 << n_bits:
+            return None
+    return narrow
 
 
 class VoxelSet:
@@ -75,7 +122,9 @@ class VoxelSet:
 
     def add(self, keys: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Add keys `(N,)`; True where a key was not there before, at its first occurrence."""
-        unique, first = np.unique(keys, return_index=True)
+        order, starts = by_key(keys)
+        first = order[starts]
+        unique = keys[first]
         new = ~self.contains(unique)
         added = np.zeros(len(keys), dtype=np.bool_)
         added[first[new]] = True

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bentwing.base.moments import Moments, Planes
-from bentwing.base.voxels import voxel_keys
+from bentwing.base.voxels import by_key, voxel_keys
 from bentwing.evaluate.robust import MAD_TO_STD
 from bentwing.evaluate.statistics import SAMPLES
 
@@ -58,7 +58,7 @@ def revisit_consistency(
     edge : m, of the cubes that hold one patch
     """
     keys = voxel_keys(points, edge)
-    order = np.lexsort((times, keys))
+    order, _ = by_key(keys, times)
     keys, points, times = keys[order], points[order], times[order]
     is_new_cube = np.append(True, keys[1:] != keys[:-1])
     is_new = is_new_cube | np.append(True, np.diff(times) > APART)

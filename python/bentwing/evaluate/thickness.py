@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bentwing.base.moments import Moments, Planes
-from bentwing.base.voxels import centres_of, unpack, voxel_keys
+from bentwing.base.voxels import by_key, centres_of, unpack, voxel_keys
 from bentwing.evaluate.revisits import APART
 from bentwing.evaluate.statistics import SAMPLES
 
@@ -140,7 +140,7 @@ def _thicknesses(patches: _Patches, *, is_timed: bool) -> tuple[Array, NDArray[n
 def _patches(points: Array, times: Array | None, edge: float, seed: int) -> tuple[_Patches, float]:
     """Draw patches; return the share of all points that is in patches of enough points, too."""
     keys = voxel_keys(points, edge)
-    order = np.argsort(keys, kind="stable") if times is None else np.lexsort((times, keys))
+    order, _ = by_key(keys, times)
     keys = keys[order]
     is_new_cube = np.append(True, keys[1:] != keys[:-1])[: len(keys)]
     is_new = is_new_cube.copy()
@@ -181,9 +181,11 @@ def _bend(patches: _Patches, offsets: Array, inside: NDArray[np.bool_]) -> Array
     axes = np.array([[1, 2], [0, 2], [0, 1]])[across][patches.owner]
     rows = np.arange(len(offsets))
     u, v = (patches.local[rows, axes[:, i]] / patches.edge for i in (0, 1))
-    terms = np.stack([np.ones_like(u), u, v, u * u, u * v, v * v], axis=1) * inside[:, None]
-    left = np.add.reduceat(terms[:, :, None] * terms[:, None, :], patches.starts)
-    right = np.add.reduceat(terms * offsets[:, None], patches.starts)
+    terms = np.stack([np.ones_like(u), u, v, u * u, u * v, v * v]) * inside
+    left = np.empty((len(patches.starts), _OF_BEND, _OF_BEND))
+    for i, j in zip(*np.triu_indices(_OF_BEND), strict=True):
+        left[:, i, j] = left[:, j, i] = np.add.reduceat(terms[i] * terms[j], patches.starts)
+    right = np.add.reduceat(terms * offsets, patches.starts, axis=1).T
     solved = np.linalg.solve(left + 1e-9 * np.eye(_OF_BEND), right[..., None])[..., 0]
     explained: Array = np.einsum("ki,ki->k", solved, right)
     return explained

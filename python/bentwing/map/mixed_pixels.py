@@ -23,7 +23,10 @@ MAX_ANGLE = 0.03  # rad; what is farther apart are no neighbours
 
 
 def mixed_pixels(
-    points: NDArray[np.float64], times: NDArray[np.float64], ring: NDArray[np.uint16] | None
+    points: NDArray[np.float64],
+    ranges: NDArray[np.float64],
+    times: NDArray[np.float64],
+    ring: NDArray[np.uint16] | None,
 ) -> NDArray[np.bool_]:
     """Return which returns may be of two surfaces at once.
 
@@ -33,6 +36,7 @@ def mixed_pixels(
     Parameters
     ----------
     points : (N, 3) float64, m, lidar frame
+    ranges : (N,) float64, m, their distances from the lidar
     times : (N,) float64, s, non-decreasing
     ring : (N,) uint16 or None, beam number; the returns of a beam are a scan line
 
@@ -40,50 +44,33 @@ def mixed_pixels(
     -------
     (N,) bool; some twigs are doubtful, too, so that further evidence must decide
     """
+    found = np.zeros(len(times), dtype=np.bool_)
     if len(times) < 5:
-        return np.zeros(len(times), dtype=np.bool_)
-    if ring is None:
-        return _between(points, times)
-    order = np.argsort(ring, kind="stable")
-    doubtful = np.zeros(len(times), dtype=np.bool_)
-    inside = _between(points.take(order, axis=0), times[order])
-    same = ring[order]
-    inside[2:-2] &= (same[:-4] == same[2:-2]) & (same[4:] == same[2:-2])
-    doubtful[order] = inside
-    return doubtful
-
-
-def _between(points: NDArray[np.float64], times: NDArray[np.float64]) -> NDArray[np.bool_]:
-    x, y, z = points.T
-    ranges = np.sqrt(x * x + y * y + z * z)
+        return found
+    order = np.arange(len(times)) if ring is None else np.argsort(ring, kind="stable")
+    ranges, times = ranges.take(order), times.take(order)
     steps = np.diff(ranges)
     sizes = np.abs(steps)
-    found = np.zeros(len(ranges), dtype=np.bool_)
     smaller = np.minimum(sizes[1:-2], sizes[2:-1])
     is_between = (steps[1:-2] * steps[2:-1] > 0) & (smaller > MIN_STEP)
     go_on = np.minimum(sizes[:-3], sizes[3:]) < GOES_ON * smaller
     # Few returns come so far, and only they are looked at closely.
     at = 2 + np.flatnonzero(is_between & go_on)
+    if ring is not None:
+        same = ring[order[at]]
+        at = at[(ring[order[at - 2]] == same) & (ring[order[at + 2]] == same)]
     if not len(at):
         return found
     # The beam times of all neighbours are alike; a longer pause is a new scan or lost returns.
     pauses = np.diff(times)
     usual = 2.5 * max(float(np.median(pauses)), 1e-7)
     near = (pauses[at - 1] <= usual) & (pauses[at] <= usual)
-    first, second = _angles(points, ranges, at - 1), _angles(points, ranges, at)
+    before, here, behind = (points[order[at + i]] / ranges[at + i, None] for i in (-1, 0, 1))
+    # Of the small angles that matter here.
+    first, second = np.linalg.norm(here - before, axis=1), np.linalg.norm(behind - here, axis=1)
     near &= (first < MAX_ANGLE) & (second < MAX_ANGLE)
     share = first / np.maximum(first + second, 1e-9)
     inverse = (1 - share) / ranges[at - 1] + share / ranges[at + 1]
     off = np.abs(ranges[at] - 1 / inverse)
-    found[at] = near & (off > PLANAR * smaller[at - 2])
+    found[order[at]] = near & (off > PLANAR * smaller[at - 2])
     return found
-
-
-def _angles(
-    points: NDArray[np.float64], ranges: NDArray[np.float64], at: NDArray[np.intp]
-) -> NDArray[np.float64]:
-    """Angles (K,) rad between returns and the next ones; of the small ones that matter here."""
-    here = points[at] / ranges[at, None]
-    there = points[at + 1] / ranges[at + 1, None]
-    angles: NDArray[np.float64] = np.linalg.norm(there - here, axis=1)
-    return angles

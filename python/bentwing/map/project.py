@@ -63,7 +63,8 @@ def project(
         batch = _placeable(batch, trajectory, segments, calibration, counts)
         if len(batch.times):
             angles = batch.angles if turned else None
-            ranges = _lengths(batch.points)
+            lengths = _lengths(batch.points)
+            ranges = lengths.astype(np.float32)
             at = np.zeros_like(batch.points)
             origins = samples.place(at, batch.times, angles, slow, threads=threads or 0)
             points = samples.place(batch.points, batch.times, angles, slow, threads=threads or 0)
@@ -74,7 +75,7 @@ def project(
                 batch.intensity,
                 batch.ring,
                 _directions(points - origins, ranges),
-                mixed_pixels(batch.points, batch.times, batch.ring),
+                mixed_pixels(batch.points, lengths, batch.times, batch.ring),
                 run_id=np.zeros(len(ranges), np.uint16),
             )
 
@@ -109,10 +110,10 @@ def _placeable(
     return batch if keep.all() else batch.where(keep)
 
 
-def _lengths(points: NDArray[np.float64]) -> NDArray[np.float32]:
+def _lengths(points: NDArray[np.float64]) -> NDArray[np.float64]:
     x, y, z = points.T  # along rows of three np.linalg.norm takes several times longer
     lengths: NDArray[np.float64] = np.sqrt(x * x + y * y + z * z)
-    return lengths.astype(np.float32)
+    return lengths
 
 
 def _directions(offsets: NDArray[np.float64], lengths: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -8,18 +8,16 @@ from __future__ import annotations
 
 import io
 import struct
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import laspy
 import lazrs  # type: ignore[import-untyped]
 import numpy as np
-from laspy.vlrs.known import LasZipVlr
 
 from bentwing import _core
 from bentwing.base.array_spool import ArraySpool
 from bentwing.map.octree import GRID, Cube, Node, nodes_of
-from bentwing.map.write_las import SCALE, LasWriter
+from bentwing.map.write_las import SCALE, LasWriter, begin_laz, write_again
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -46,13 +44,9 @@ class CopcWriter(LasWriter):
     def _begin(self, first: MapChunk) -> None:
         self._announce(first)
         self._spool = ArraySpool(self._temporary.parent, held=_HELD)
-        self._seen = _Seen()
 
-    def _append(self, chunk: MapChunk) -> None:
-        if len(chunk):
-            rows = self._records(chunk)
-            self._seen.add(rows)
-            self._spool.add({_COLUMN: rows})
+    def _put(self, rows: NDArray[np.void]) -> None:
+        self._spool.add({_COLUMN: rows})
 
     def _finish(self) -> None:
         with self._spool, self._temporary.open("w+b") as file:
@@ -62,25 +56,19 @@ class CopcWriter(LasWriter):
         self._spool.close()
 
     def _write(self, file: io.BufferedRandom) -> None:
-        header, cube, n = self._header, Cube.around(self._seen.low, self._seen.high), self.n_points
+        header, cube, n = self._header, self._cube(), self.n_points
         point_format = header.point_format
         laz = _core.LazCompressor(point_format.id, point_format.num_extra_bytes, own_chunks=True)
-        record = laz.record_data()
         # The description of the tree has to be the first record; it is written again at the end.
         header.vlrs.insert(0, _info(self._info(cube, (0, 0))))
-        header.vlrs.append(LasZipVlr(record))
-        header.are_points_compressed = True
-        header.write_to(file)
-        file.flush()
-        start = file.tell()
-        laz.begin(self._temporary, start)
+        start = begin_laz(laz, file, header)
         with self.progress.stage("octree", n, "points") as shown:
             nodes = []
             for node, count in self._compressed(laz, cube, n):
                 nodes.append((node, count))
                 shown.advance(count)
         laz.finish()
-        hierarchy = self._hierarchy(file, start, record, nodes)
+        hierarchy = self._hierarchy(file, start, laz.record_data(), nodes)
         at = file.seek(0, io.SEEK_END)
         file.write(
             _EVLR.pack(0, _USER.encode(), _HIERARCHY, len(hierarchy), b"nodes of the octree")
@@ -89,8 +77,15 @@ class CopcWriter(LasWriter):
         header.start_of_first_evlr, header.number_of_evlrs = at, 1
         header.vlrs[0] = _info(self._info(cube, (at + _EVLR.size, len(hierarchy))))
         self._seen.say(header, n)
-        file.seek(0)
-        header.write_to(file, ensure_same_size=True)
+        write_again(header, file)
+
+    def _cube(self) -> Cube:
+        """Return what the octree fills."""
+        ends = self._seen.ends
+        if not len(ends):
+            return Cube.around(np.zeros(3, np.int64), np.zeros(3, np.int64))
+        low, high = np.stack([ends[axis] for axis in "XYZ"], axis=1).astype(np.int64)
+        return Cube.around(low, high)
 
     def _compressed(
         self, laz: _core.LazCompressor, cube: Cube, n_points: int
@@ -140,35 +135,9 @@ class CopcWriter(LasWriter):
         """Return the description of the tree; `page` is where its nodes are listed, and how long that is."""
         edge = cube.edge * SCALE
         centre = self._header.offsets + cube.low * SCALE + 0.5 * edge
-        times = (self._seen.first, self._seen.last) if self.n_points else (0.0, 0.0)
+        times = self._seen.ends["gps_time"] if self.n_points else (0.0, 0.0)
         packed = struct.pack("<5d2Q2d", *centre, 0.5 * edge, edge / GRID, *page, *times)
         return packed.ljust(_INFO_SIZE, b"\0")
-
-
-@dataclass
-class _Seen:
-    """Where and when the points are, in steps of the coordinates and s."""
-
-    low: NDArray[np.int64] = field(default_factory=lambda: np.zeros(3, np.int64))
-    high: NDArray[np.int64] = field(default_factory=lambda: np.zeros(3, np.int64))
-    first: float = np.inf
-    last: float = -np.inf
-
-    def add(self, rows: NDArray[np.void]) -> None:
-        low = np.array([rows[axis].min() for axis in "XYZ"], np.int64)
-        high = np.array([rows[axis].max() for axis in "XYZ"], np.int64)
-        is_first = self.first > self.last
-        self.low = low if is_first else np.minimum(self.low, low)
-        self.high = high if is_first else np.maximum(self.high, high)
-        self.first = min(self.first, float(rows["gps_time"].min()))
-        self.last = max(self.last, float(rows["gps_time"].max()))
-
-    def say(self, header: laspy.LasHeader, n_points: int) -> None:
-        """Write it into a header."""
-        header.point_count = n_points
-        header.number_of_points_by_return[0] = n_points
-        header.mins = self.low * SCALE + header.offsets
-        header.maxs = self.high * SCALE + header.offsets
 
 
 def _info(data: bytes) -> laspy.VLR:

@@ -3,19 +3,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import laspy
 import numpy as np
-from laspy.vlrs.known import WktCoordinateSystemVlr
+from laspy.vlrs.known import LasZipVlr, WktCoordinateSystemVlr
 
 from bentwing import _core
 from bentwing.base.gps_time import adjusted_gps_origin
-from bentwing.map.compress_laz import LazBackend
 from bentwing.map.writer import MapWriter, round_offset
 
 if TYPE_CHECKING:
-    from pathlib import Path
+    from collections.abc import Iterable
 
     from numpy.typing import NDArray
 
@@ -48,20 +48,15 @@ class LasWriter(MapWriter):
     above 1 in the first chunk) are multiplied by 65,535.
     """
 
-    compressed = False
-
     def __init__(self, path: Path, clock_origin_ns: int, crs_wkt: str | None = None) -> None:
         super().__init__(path, clock_origin_ns, crs_wkt)
         self._gps_origin = adjusted_gps_origin(clock_origin_ns)
+        self._seen = _Seen()
 
     def _begin(self, first: MapChunk) -> None:
         self._announce(first)
-        self._writer = laspy.LasWriter(
-            self._temporary.open("wb"),
-            self._header,
-            do_compress=self.compressed,
-            laz_backend=LazBackend(self._temporary) if self.compressed else None,
-        )
+        self._file = self._temporary.open("wb")
+        self._header.write_to(self._file)
 
     def _announce(self, first: MapChunk) -> None:
         """Decide what the records have."""
@@ -69,9 +64,13 @@ class LasWriter(MapWriter):
         self._intensity_scale = _intensity_scale(first)
 
     def _append(self, chunk: MapChunk) -> None:
-        self._writer.write_points(
-            laspy.PackedPointRecord(self._records(chunk), self._header.point_format)
-        )
+        if len(chunk):
+            rows = self._records(chunk)
+            self._seen.add(rows, self._header.point_format.extra_dimension_names)
+            self._put(rows)
+
+    def _put(self, rows: NDArray[np.void]) -> None:
+        self._file.write(rows.data)
 
     def _records(self, chunk: MapChunk) -> NDArray[np.void]:
         """Return the records (N,) of a chunk as the file has them."""
@@ -92,16 +91,83 @@ class LasWriter(MapWriter):
         return table
 
     def _finish(self) -> None:
-        self._writer.close()
+        with self._file:
+            self._seen.say(self._header, self.n_points)
+            write_again(self._header, self._file)
 
     def _abandon(self) -> None:
-        self._writer.close()
+        self._file.close()
 
 
 class LazWriter(LasWriter):
     """Writer of compressed LAZ."""
 
-    compressed = True
+    def _begin(self, first: MapChunk) -> None:
+        self._announce(first)
+        point_format = self._header.point_format
+        self._laz = _core.LazCompressor(point_format.id, point_format.num_extra_bytes)
+        self._file = self._temporary.open("wb")
+        begin_laz(self._laz, self._file, self._header)
+
+    def _put(self, rows: NDArray[np.void]) -> None:
+        self._laz.compress(rows.view(np.uint8))
+
+    def _finish(self) -> None:
+        self._laz.finish()
+        super()._finish()
+
+
+class _Seen:
+    """Between which ends the numbers of the records are.
+
+    Attributes
+    ----------
+    ends : (2,) records with the least and the greatest of each number; (0,) before there are any
+    """
+
+    def __init__(self) -> None:
+        self.ends = np.empty(0, np.void)
+
+    def add(self, rows: NDArray[np.void], extra: Iterable[str]) -> None:
+        """Take records (N,), at least one, with extra dimensions of these names."""
+        names = ("X", "Y", "Z", "gps_time", *extra)
+        ends = _ends_of(rows, names)
+        known = [self.ends, ends] if len(self.ends) else [ends]
+        self.ends = _ends_of(np.concatenate(known), names)
+
+    def say(self, header: laspy.LasHeader, n_points: int) -> None:
+        """Write it into a header; laspy looks at the two ends in place of all records."""
+        header.update(laspy.PackedPointRecord(self.ends[:1], header.point_format))
+        if n_points:  # one by one, as of extra dimensions laspy sees the first record alone
+            header.grow(laspy.PackedPointRecord(self.ends[1:], header.point_format))
+        header.point_count = n_points
+        header.number_of_points_by_return[0] = n_points
+
+
+def _ends_of(rows: NDArray[np.void], names: Iterable[str]) -> NDArray[np.void]:
+    ends = np.zeros(2, rows.dtype)
+    for name in names:
+        values = np.ascontiguousarray(rows[name])
+        # what is not a number is no end, save where there is nothing else
+        ends[name] = np.fmin.reduce(values), np.fmax.reduce(values)
+    return ends
+
+
+def begin_laz(laz: _core.LazCompressor, file: BinaryIO, header: laspy.LasHeader) -> int:
+    """Write the header of a compressed file; return where its points begin."""
+    header.vlrs.append(LasZipVlr(laz.record_data()))
+    header.are_points_compressed = True
+    header.write_to(file)
+    file.flush()
+    start = file.tell()
+    laz.begin(Path(file.name), start)
+    return start
+
+
+def write_again(header: laspy.LasHeader, file: BinaryIO) -> None:
+    """Write what the header says now over what it said at the beginning of the file."""
+    file.seek(0)
+    header.write_to(file, ensure_same_size=True)
 
 
 def _header(first: MapChunk, crs_wkt: str | None) -> laspy.LasHeader:

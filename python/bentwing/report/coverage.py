@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bentwing.base.voxels import by_key
 from bentwing.report.colours import HEIGHT, TIME, colour
 from bentwing.report.picture import PAPER, View, thinned
 from bentwing.report.svg import map_view
@@ -21,6 +22,7 @@ _WIDTH = 640  # pixels of the picture, about
 _APART = 10.0  # s without any point in a cell, which divide two visits
 _MOST_VISITS = 8.0  # at the end of the colour map at least this many
 _FLOATING = 0.02  # of a cell's points at either end are no surface
+_STEPS = 1 << 40  # from the lowest to the highest point
 _FEWEST = 3  # sampled points in a cell that count as seen
 
 
@@ -100,23 +102,27 @@ def _heights(
     keys: NDArray[np.int64], z: NDArray[np.float64], seen: NDArray[np.bool_]
 ) -> NDArray[np.float64]:
     """Return the height (K,) m between the lowest and the highest surface of each cell that was seen."""
-    order = np.lexsort((z, keys))
-    keys, z = keys[order], z[order]
     cells = np.flatnonzero(seen)
-    first, last = np.searchsorted(keys, cells), np.searchsorted(keys, cells, side="right")
+    lowest = z.min()
+    step = max(float(z.max() - lowest), _FINEST) / _STEPS
+    # Cell and height in one number: to sort numbers takes a fifth of the time of sorting rows.
+    ordered = keys * (_STEPS + 1) + ((z - lowest) / step).astype(np.int64)
+    ordered.sort()
+    first, last = (np.searchsorted(ordered, n * (_STEPS + 1)) for n in (cells, cells + 1))
     # a point or two that float are no surface
     slack = ((last - first) * _FLOATING).astype(np.int64)
-    heights: NDArray[np.float64] = z[last - 1 - slack] - z[first + slack]
+    steps = ordered[last - 1 - slack] - ordered[first + slack]
+    heights: NDArray[np.float64] = steps * step
     return heights
 
 
 def _visits(keys: NDArray[np.int64], times: NDArray[np.float64], n: int) -> NDArray[np.float64]:
     """Count the visits of each of `n` cells."""
-    order = np.lexsort((times, keys))
+    order, starts = by_key(keys, times)
     keys, times = keys[order], times[order]
     again = (keys[1:] == keys[:-1]) & (np.diff(times) > _APART)
     visits = np.bincount(keys[1:][again], minlength=n).astype(np.float64)
-    visits[np.unique(keys)] += 1.0
+    visits[keys[starts]] += 1.0
     return visits
 
 

@@ -72,6 +72,21 @@ def test_rows_of_equal_keys_are_brought_together_in_their_order(values):
     ]
 
 
+NEAR_AND_FAR = st.one_of(
+    st.integers(0, 5), st.integers(-(2**63), 2**63 - 1), st.integers(0, 5).map(lambda i: i << 42)
+)
+
+
+@given(st.lists(st.tuples(NEAR_AND_FAR, st.integers(0, 3))))
+def test_rows_of_equal_keys_are_in_the_order_of_their_times(rows):
+    keys = np.array([key for key, _ in rows], np.int64)
+    times = np.array([float(time) for _, time in rows])
+    assert np.array_equal(by_key(keys)[0], np.argsort(keys, kind="stable"))
+    order, starts = by_key(keys, times)
+    assert np.array_equal(order, np.lexsort((times, keys)))
+    assert np.array_equal(keys[order[starts]], np.unique(keys))
+
+
 def test_the_set_agrees_with_a_set_of_python():
     rng, reference, ours = np.random.default_rng(1), set(), VoxelSet()
     for _ in range(200):

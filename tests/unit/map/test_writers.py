@@ -75,6 +75,22 @@ def test_laz_carries_time_intensity_range_and_ring(tmp_path):
     assert np.allclose(las.gps_time - 384_035_218.123456789, part.times, atol=6e-8, rtol=0)
 
 
+@pytest.mark.parametrize("map_format", ["laz", "las", "copc.laz"])
+def test_the_header_has_the_ends_of_all_that_is_written(tmp_path, map_format):
+    parts = [chunk(200, seed, incidence=np.full(200, np.nan, np.float32)) for seed in range(2)]
+    parts[1].incidence[:3] = np.radians([20.0, 10.0, 40.0])
+    with laspy.open(written(tmp_path / f"map.{map_format}", map_format, *parts)) as file:
+        header, las = file.header, file.read()
+    for axis, column in enumerate("xyz"):
+        assert (header.mins[axis], header.maxs[axis]) == (las[column].min(), las[column].max())
+    assert header.number_of_points_by_return.tolist() == [400] + 14 * [0]
+    (described,) = header.vlrs.get("ExtraBytesVlr")
+    ends = {d.format_name(): (d.min, d.max) for d in described.extra_bytes_structs}
+    assert ends["range"] == (las["range"].min(), las["range"].max())
+    assert ends["ring"] == (0, 15)
+    assert ends["incidence"] == (10.0, 40.0)
+
+
 def test_las_without_intensity_and_ring_has_no_ring(tmp_path):
     las = laspy.read(written(tmp_path / "map.las", "las", chunk(5, intensity=None, ring=None)))
     assert list(las.point_format.extra_dimension_names) == ["range"]

@@ -126,12 +126,16 @@ def sample_shots(
             break
         if batch.ring is None and not table:
             return None
-        held.append(batch.where((times >= first) & (times <= last)))
-    if not held or sum(len(b.times) for b in held) < 2:
+        inside = slice(np.searchsorted(times, first), np.searchsorted(times, last, side="right"))
+        held.append(batch.where(inside))
+    n = sum(len(batch.times) for batch in held)
+    if n < 2:
         return None
-    every = max(1, sum(len(b.times) for b in held) // MANY)
-    whole = LidarBatch.joined(held)
-    return _placed(whole.where(np.arange(0, len(whole.times), every)), estimate, table)
+    every, passed, chosen = max(1, n // MANY), 0, []
+    for batch in held:
+        chosen.append(batch.where(slice(-passed % every, None, every)))
+        passed += len(batch.times)
+    return _placed(LidarBatch.joined(chosen), estimate, table)
 
 
 def _span(estimate: Estimate) -> tuple[float, float]:

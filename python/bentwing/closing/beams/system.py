@@ -159,23 +159,27 @@ def _without_planes(rows: sparse.csr_matrix, weights: Array, cells: Cells) -> tu
     """Return the normal equations of poses and beams, height and slopes of each plane eliminated."""
     from scipy import sparse
 
-    n = len(weights)
-    planes = np.column_stack([np.ones(n), cells.along])
-    columns = 3 * cells.cells[:, None] + np.arange(3)
-    basis = sparse.csr_matrix(
-        (planes.ravel(), columns.ravel(), np.arange(0, 3 * n + 1, 3)), shape=(n, 3 * cells.n_cells)
-    )
-    products = weights[:, None, None] * planes[:, :, None] * planes[:, None, :]
+    n, roots = len(weights), np.sqrt(weights)
+    values = rows.data.reshape(n, -1) * roots[:, None]
+    scaled = sparse.csr_matrix((values.ravel(), rows.indices, rows.indptr), shape=rows.shape)
+    planes = roots[:, None] * np.column_stack([np.ones(n), cells.along])
     order = np.argsort(cells.cells, kind="stable")
     starts = np.searchsorted(cells.cells[order], np.arange(cells.n_cells))
-    own = np.add.reduceat(products[order], starts, axis=0)
-    inverse = sparse.block_diag(np.linalg.inv(own), format="csr")
-    weighted = rows.multiply(weights[:, None]).tocsr().T.tocsr()
-    mixed = (weighted @ basis).tocsr()
-    # Its rows are full: dense products are several times faster.
-    H = (weighted @ rows).toarray() - mixed.toarray() @ (inverse @ mixed.T).toarray()
-    pulled = basis.T @ (weights * cells.across)
-    g = weighted @ cells.across - mixed @ (inverse @ pulled)
+    own = np.add.reduceat((planes[:, :, None] * planes[:, None, :])[order], starts, axis=0)
+    # Columns of a length of one each, which are normal to each other: to eliminate them is a product
+    # of a matrix with itself.
+    inverse = np.linalg.inv(np.linalg.cholesky(own))
+    basis = np.einsum("nij,nj->ni", inverse[cells.cells], planes)
+    columns = 3 * cells.cells[:, None] + np.arange(3)
+    of_cells = sparse.csr_matrix(
+        (basis.ravel(), columns.ravel(), np.arange(0, 3 * n + 1, 3)), shape=(n, 3 * cells.n_cells)
+    )
+    transposed = scaled.T.tocsr()
+    mixed = (transposed @ of_cells).toarray()
+    H = (transposed @ scaled).toarray()
+    H -= mixed @ mixed.T
+    across = roots * cells.across
+    g = transposed @ across - mixed @ (of_cells.T @ across)
     return H, np.asarray(g)
 
 

@@ -200,13 +200,14 @@ def _is_steady(residuals: Array, jitter: float) -> bool:
         return False
     usual = ~(late | early)
     n_parts = min(N_PARTS, n // PART)
-    parts, keep = (np.array_split(values, n_parts) for values in (residuals, usual))
-    for part, kept in zip(parts, keep, strict=True):
-        n_kept = int(kept.sum())
-        if n_kept == 0:
-            return False
-        allowed = jitter * (DISAGREEMENT[0] / np.sqrt(n_kept) + DISAGREEMENT[1])
-        if abs(float(part[kept].mean())) > max(allowed, 1e-9):
-            return False
+    size, n_larger = divmod(n, n_parts)
+    begins = size * np.arange(n_parts) + np.minimum(np.arange(n_parts), n_larger)
     left = np.where(usual, residuals, 0.0)
+    n_kept = np.add.reduceat(usual, begins, dtype=np.int64)
+    if not n_kept.all():
+        return False
+    means = np.add.reduceat(left, begins) / n_kept
+    allowed = jitter * (DISAGREEMENT[0] / np.sqrt(n_kept) + DISAGREEMENT[1])
+    if (np.abs(means) > np.maximum(allowed, 1e-9)).any():
+        return False
     return float(left[1:] @ left[:-1]) <= MOST_LASTING * max(float(left @ left), 1e-18 * n)

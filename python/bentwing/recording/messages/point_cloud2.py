@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from bentwing.recording import point_times
-from bentwing.recording.batches import LidarBatch
+from bentwing.recording.batches import LidarBatch, rows
 from bentwing.recording.messages import wire_clouds
 from bentwing.recording.messages.decoder import LidarDecoder
 from bentwing.recording.messages.wire import BrokenMessageError
@@ -150,7 +150,8 @@ def columns(cloud: RawCloud, counts: Counter[str], times: str | None = None) -> 
         points[:, axis] = table[name]
     keep = valid(points, counts)
     if not keep.all():
-        points, table = points[keep], table[keep]
+        chosen = np.flatnonzero(keep)
+        points, table = rows(points, chosen), rows(table, chosen)
     intensity, ring = (_find(names, group) for group in (INTENSITY_NAMES, RING_NAMES))
     time = time_field(cloud, times)
     return Columns(

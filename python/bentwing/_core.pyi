@@ -40,7 +40,6 @@ __all__ = [
     "Samples",
     "Scene",
     "SurfaceSample",
-    "Surfaces",
     "Surfels",
     "__version__",
     "extract_surfels",
@@ -244,11 +243,19 @@ class SurfaceSample:
         beams: NDArray[np.float32],
         ranges: NDArray[np.float32],
         times: NDArray[np.float64],
+        own: NDArray[np.bool_],
     ) -> None:
-        """Add points (N, 3) m, map frame, with the unit directions, lengths (m) and times (s) of their beams."""
+        """Add points (N, 3) m, map frame, with the unit directions, lengths (m) and times (s) of their beams.
 
-    def fit(self, *, noise: RangeNoise | None = None, threads: int = 0) -> Surfaces | None:
-        """Find the surfaces; ends the sample.
+        Parameters
+        ----------
+        own : whether each is to be refined, or only tells where others are
+        """
+
+    def refine(
+        self, *, noise: RangeNoise | None = None, threads: int = 0
+    ) -> tuple[RangeNoise, NDArray[np.float32], NDArray[np.float32]] | None:
+        """Find the surfaces and where the points to be refined most probably are; ends the sample.
 
         Parameters
         ----------
@@ -256,28 +263,9 @@ class SurfaceSample:
 
         Returns
         -------
+        The noise; and of the points to be refined, in their order, the moves along the beams (m, away
+        from the lidar; 0 where a point stays) and the standard deviations that are left along them (m).
         None where there is no smooth surface.
-        """
-
-@final
-class Surfaces:
-    """Surfaces of a part of a map."""
-
-    @property
-    def noise(self) -> RangeNoise:
-        """The noise of the ranges."""
-
-    def refine(
-        self,
-        points: NDArray[np.float64],
-        *,
-        beams: NDArray[np.float32],
-        ranges: NDArray[np.float32],
-        threads: int = 0,
-    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Return moves along the beams (m, away from the lidar; 0 where a point stays) and what is left.
-
-        The latter is the standard deviation along the beam, m.
         """
 
 @final

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! `_core.SurfaceSample` and `_core.Surfaces`: where along its beam each point of a map most probably is.
+//! `_core.SurfaceSample`: where along its beam each point of a map most probably is.
 
-use bentwing_refinement::{Noise, Sample, Settings, Surfaces as Found};
+use bentwing_refinement::{Noise, Sample, Settings};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
@@ -9,8 +9,12 @@ use pyo3::prelude::*;
 use crate::arrays::{finite, finite_number, finite_rows, require_rows, rows, same};
 use crate::errors::in_pool;
 
-/// Two columns of numbers.
-type Columns<'py> = (Bound<'py, PyArray1<f32>>, Bound<'py, PyArray1<f32>>);
+/// The noise, moves and standard deviations.
+type Refined<'py> = (
+    RangeNoise,
+    Bound<'py, PyArray1<f32>>,
+    Bound<'py, PyArray1<f32>>,
+);
 
 /// How noisy the ranges of a map are, as its smooth surfaces show it.
 #[pyclass(frozen, module = "bentwing._core")]
@@ -62,8 +66,9 @@ impl SurfaceSample {
         }))))
     }
 
-    /// Adds points with the unit directions, lengths and times of their beams.
-    #[pyo3(signature = (points, *, beams, ranges, times))]
+    /// Adds points with the unit directions, lengths and times of their beams, and whether each is to be
+    /// refined or only tells where others are.
+    #[pyo3(signature = (points, *, beams, ranges, times, own))]
     fn add(
         &mut self,
         py: Python<'_>,
@@ -71,63 +76,35 @@ impl SurfaceSample {
         beams: PyReadonlyArray2<'_, f32>,
         ranges: PyReadonlyArray1<'_, f32>,
         times: PyReadonlyArray1<'_, f64>,
+        own: PyReadonlyArray1<'_, bool>,
     ) -> PyResult<()> {
         let points = finite_rows("points", &points)?;
         let n = points.len();
         let (beams, ranges) = (rows("beams", &beams)?, same("ranges", &ranges, n)?);
         require_rows("beams", beams.len(), n)?;
-        let times = finite("times", &times, n)?;
+        let (times, own) = (finite("times", &times, n)?, same("own", &own, n)?);
         let sample = self.0.as_mut().ok_or_else(used)?;
-        crate::errors::detached(py, || sample.add(points, beams, ranges, times));
+        crate::errors::detached(py, || sample.add(points, beams, ranges, times, own));
         Ok(())
     }
 
-    /// The surfaces, for the noise of the ranges or else that which smooth surfaces show; None without
-    /// such; ends the sample.
+    /// The noise of the ranges: the given one, or else that which smooth surfaces show; and of the points
+    /// to be refined, in their order, the moves along the beams (m, away from the lidar; 0 where a point
+    /// stays) and the standard deviations that are left (m). None without smooth surfaces. Ends the sample.
     #[pyo3(signature = (*, noise=None, threads=0))]
-    fn fit(
+    fn refine<'py>(
         &mut self,
-        py: Python<'_>,
+        py: Python<'py>,
         noise: Option<&RangeNoise>,
         threads: usize,
-    ) -> PyResult<Option<Surfaces>> {
+    ) -> PyResult<Option<Refined<'py>>> {
         let sample = self.0.take().ok_or_else(used)?;
         let known = noise.map(|n| n.0.clone());
-        in_pool(py, threads, || sample.fit(known).map(Surfaces))
-    }
-}
-
-/// Surfaces of a part of a map.
-#[pyclass(frozen, module = "bentwing._core")]
-pub(crate) struct Surfaces(Found);
-
-#[pymethods]
-impl Surfaces {
-    /// The noise of the ranges.
-    #[getter]
-    fn noise(&self) -> RangeNoise {
-        RangeNoise(self.0.noise().clone())
-    }
-
-    /// Moves along the beams (m, away from the lidar; 0 where a point stays), and the standard
-    /// deviations that are left (m).
-    #[pyo3(signature = (points, *, beams, ranges, threads=0))]
-    fn refine<'py>(
-        &self,
-        py: Python<'py>,
-        points: PyReadonlyArray2<'py, f64>,
-        beams: PyReadonlyArray2<'py, f32>,
-        ranges: PyReadonlyArray1<'py, f32>,
-        threads: usize,
-    ) -> PyResult<Columns<'py>> {
-        let points = finite_rows("points", &points)?;
-        let (beams, ranges) = (
-            rows("beams", &beams)?,
-            same("ranges", &ranges, points.len())?,
-        );
-        require_rows("beams", beams.len(), points.len())?;
-        let found = in_pool(py, threads, || self.0.refine(points, beams, ranges))?;
-        Ok((found.moves.into_pyarray(py), found.sigmas.into_pyarray(py)))
+        let found = in_pool(py, threads, || sample.refine(known))?;
+        Ok(found.map(|f| {
+            let columns = (f.moves.into_pyarray(py), f.sigmas.into_pyarray(py));
+            (RangeNoise(f.noise), columns.0, columns.1)
+        }))
     }
 }
 

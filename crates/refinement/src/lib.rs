@@ -14,4 +14,3 @@ mod surfaces;
 pub use noise::Noise;
 pub use refine::Refined;
 pub use sample::{Sample, Settings};
-pub use surfaces::Surfaces;

@@ -3,8 +3,9 @@
 
 use rayon::prelude::*;
 
-use crate::grid::{Level, code_of};
+use crate::grid::{Level, NONE, code_of};
 use crate::noise::step_of;
+use crate::sheet::N_PASSES;
 
 /// How surfaces are found.
 #[derive(Clone, Copy, Debug)]
@@ -31,7 +32,9 @@ pub(crate) struct Shot {
     pub beam: [f32; 3],
     /// Of the range.
     pub step: u8,
-    pub pass: u16,
+    pub pass: u8,
+    /// Among those that are refined; `NONE` where it only tells where others are.
+    pub place: u32,
 }
 
 /// Points of a part of a map, in any order.
@@ -40,15 +43,16 @@ pub struct Sample {
     settings: Settings,
     origin: Option<[f64; 3]>,
     shots: Vec<Shot>,
+    n_own: u32,
 }
 
 /// Points by their cells.
 #[derive(Clone, Debug)]
 pub(crate) struct Sorted {
     pub settings: Settings,
-    pub origin: [f64; 3],
     pub shots: Vec<Shot>,
     pub levels: Vec<Level>,
+    pub n_own: usize,
 }
 
 impl Sample {
@@ -58,20 +62,37 @@ impl Sample {
             settings,
             origin: None,
             shots: Vec::new(),
+            n_own: 0,
         }
     }
 
     /// Adds points (m, map frame) with the unit directions of their beams, the beams' lengths (m) and
-    /// times (s).
-    pub fn add(&mut self, points: &[[f64; 3]], beams: &[[f32; 3]], ranges: &[f32], times: &[f64]) {
-        let Some(&first) = points.first() else { return };
-        let origin = *self.origin.get_or_insert(first);
+    /// times (s), and whether each is to be refined or only tells where others are.
+    pub fn add(
+        &mut self,
+        points: &[[f64; 3]],
+        beams: &[[f32; 3]],
+        ranges: &[f32],
+        times: &[f64],
+        own: &[bool],
+    ) {
+        let Some(first) = points.first() else { return };
+        // Wherever a part begins, its cells are those of the map.
+        let largest = self.settings.edge * f64::from(1_u32 << (self.settings.n_levels - 1));
+        let origin = *self
+            .origin
+            .get_or_insert_with(|| first.map(|c| (c / largest).floor() * largest));
+        self.shots.reserve(points.len());
         for (i, p) in points.iter().enumerate() {
+            let place = if own[i] { self.n_own } else { NONE };
+            self.n_own += u32::from(own[i]);
             self.shots.push(Shot {
                 at: [0, 1, 2].map(|a| (p[a] - origin[a]) as f32),
                 beam: beams[i],
                 step: step_of(ranges[i]),
-                pass: (times[i] / self.settings.pass).floor() as i64 as u16,
+                pass: ((times[i] / self.settings.pass).floor() as i64).rem_euclid(N_PASSES as i64)
+                    as u8,
+                place,
             });
         }
     }
@@ -90,15 +111,16 @@ impl Sample {
             .par_iter()
             .map(|&(_, i)| self.shots[i as usize])
             .collect();
+        drop(self.shots);
         let codes: Vec<u64> = order.into_iter().map(|(code, _)| code).collect();
         let levels = (0..self.settings.n_levels)
             .map(|l| Level::of(&codes, edge, l))
             .collect();
         Sorted {
             settings: self.settings,
-            origin: self.origin.unwrap_or_default(),
             shots,
             levels,
+            n_own: self.n_own as usize,
         }
     }
 }

@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The sheets in every cell of a sample.
 
+use std::ops::Range;
+
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-use crate::grid::Level;
+use crate::grid::{Level, N_AROUND, NONE, beside};
 use crate::noise::Noise;
 use crate::piece::Piece;
-use crate::sample::{Sample, Sorted};
-use crate::sheet::{N_PASSES, Sheet, Spot, normal_of};
+use crate::sample::Sorted;
+use crate::sheet::{Sheet, Spot, normal_of};
 use crate::split::{Half, split};
 
 /// Points around a middle are used up to so many edges away, with less and less weight.
@@ -17,8 +19,9 @@ const REACH: f64 = 1.5;
 const MOST_SPOTS: usize = 200;
 /// Fewer points of one side are no sheet.
 const FEWEST_SPOTS: usize = 8;
-/// One of so many cells is looked at to learn the noise.
+/// One of so many cells is looked at to learn the noise, and no more cells of a size than about so many.
 const NOISE_EVERY: usize = 8;
+const MOST_CELLS: usize = 8192;
 /// The noise is read where beams meet a sheet at more than this cosine, m.
 const NOISE_COSINE: f64 = 0.5;
 /// Cells per parallel task; fixed, so that results do not depend on the number of threads.
@@ -26,94 +29,130 @@ const CHUNK: usize = 64;
 /// Residuals beyond this many standard deviations of what noise alone would make show a second sheet.
 const SUSPICIOUS: f64 = 1.5;
 
-/// The sheets of the cells of one size, by the numbers of the cells.
+/// The sheets of the cells of one size.
 #[derive(Clone, Debug)]
 pub(crate) struct Layer {
-    pub level: Level,
-    starts: Vec<u32>,
+    /// By the number of the cell, which of the patches is its own.
+    slots: Vec<u32>,
+    patches: Vec<Patch>,
     pieces: Vec<Piece>,
 }
 
-impl Layer {
-    #[inline]
-    pub(crate) fn of_cell(&self, number: u32) -> &[Piece] {
-        let at = number as usize;
-        &self.pieces[self.starts[at] as usize..self.starts[at + 1] as usize]
-    }
-}
-
-/// Surfaces of a part of a map.
+/// What a cell has.
 #[derive(Clone, Debug)]
-pub struct Surfaces {
-    pub(crate) origin: [f64; 3],
-    pub(crate) layers: Vec<Layer>,
-    pub(crate) noise: Noise,
+pub(crate) struct Patch {
+    pieces: Range<u32>,
+    /// Along each axis the cells at the lower and the upper side.
+    pub beside: [[u32; 2]; 3],
 }
 
-impl Surfaces {
-    /// The noise of the ranges.
-    pub fn noise(&self) -> &Noise {
-        &self.noise
+/// What was found in a cell, and what is around.
+struct Found {
+    number: u32,
+    pieces: Vec<Piece>,
+    beside: [[u32; 2]; 3],
+}
+
+impl Layer {
+    fn of(level: &Level, found: impl Iterator<Item = Found>) -> Self {
+        let mut layer = Self {
+            slots: vec![NONE; level.n_cells()],
+            patches: Vec::new(),
+            pieces: Vec::new(),
+        };
+        for cell in found {
+            let first = layer.pieces.len() as u32;
+            layer.slots[cell.number as usize] = layer.patches.len() as u32;
+            layer.pieces.extend(cell.pieces);
+            layer.patches.push(Patch {
+                pieces: first..layer.pieces.len() as u32,
+                beside: cell.beside,
+            });
+        }
+        layer
+    }
+
+    /// What a cell has, if it has a sheet.
+    #[inline]
+    pub(crate) fn patch(&self, number: u32) -> Option<&Patch> {
+        let slot = *self.slots.get(number as usize)?;
+        self.patches.get(slot as usize)
+    }
+
+    #[inline]
+    pub(crate) fn pieces(&self, patch: &Patch) -> &[Piece] {
+        &self.pieces[patch.pieces.start as usize..patch.pieces.end as usize]
     }
 }
 
-impl Sample {
-    /// Finds the surfaces of points whose ranges have this noise, or else the one that their smooth
-    /// surfaces show; none where there are no such.
-    pub fn fit(self, noise: Option<Noise>) -> Option<Surfaces> {
-        let sorted = self.sorted();
-        let noise = noise.or_else(|| noise_of(&sorted))?;
-        let mut covered = vec![false; sorted.shots.len()];
-        let mut layers = Vec::new();
-        for level in &sorted.levels {
-            let cells: Vec<u32> = (0..level.n_cells() as u32)
-                .filter(|&c| level.points(c).any(|i| !covered[i]))
-                .collect();
-            let found: Vec<Vec<Piece>> = cells
-                .par_iter()
-                .with_min_len(CHUNK)
-                .map_init(Vec::new, |spots, &c| {
-                    pieces_of(&sorted, level, c, &noise, spots)
-                })
-                .collect();
-            let mut layer = Layer {
-                level: Level::default(),
-                starts: vec![0; level.n_cells() + 1],
-                pieces: Vec::new(),
-            };
-            let mut own = cells.iter().zip(found).peekable();
-            for number in 0..level.n_cells() as u32 {
-                if own.peek().is_some_and(|(c, _)| **c == number)
-                    && let Some((_, pieces)) = own.next()
-                {
-                    if !pieces.is_empty() {
-                        covered[level.points(number)].fill(true);
-                    }
-                    layer.pieces.extend(pieces);
-                }
-                layer.starts[number as usize + 1] = layer.pieces.len() as u32;
-            }
-            layers.push(layer);
+/// The sheets of all sizes of cells; those that smaller ones cover have none.
+pub(crate) fn layers_of(sorted: &Sorted, noise: &Noise) -> Vec<Layer> {
+    let mut open = wanted(sorted);
+    let of_level = |level: &Level| {
+        let cells: Vec<usize> = (0..level.n_cells())
+            .filter(|&place| level.points(level.in_rows(place)).any(|i| open[i]))
+            .collect();
+        let found: Vec<Vec<Found>> = cells
+            .par_chunks(CHUNK)
+            .map_init(Vec::new, |spots, places| {
+                let mut around = level.around(places[0]);
+                let of_cell = |&place: &usize| {
+                    let (number, around) = (level.in_rows(place), around.of(place));
+                    let pieces = pieces_of(sorted, level, number, &around, noise, spots);
+                    let beside = beside(&around);
+                    (!pieces.is_empty()).then_some(Found {
+                        number,
+                        pieces,
+                        beside,
+                    })
+                };
+                places.iter().filter_map(of_cell).collect()
+            })
+            .collect();
+        for cell in found.iter().flatten() {
+            open[level.points(cell.number)].fill(false);
         }
-        for (layer, level) in layers.iter_mut().zip(sorted.levels) {
-            layer.level = level;
-        }
-        Some(Surfaces {
-            origin: sorted.origin,
-            layers,
-            noise,
-        })
-    }
+        Layer::of(level, found.into_iter().flatten())
+    };
+    sorted.levels.iter().map(of_level).collect()
 }
 
-fn noise_of(sorted: &Sorted) -> Option<Noise> {
+/// Whether each point is in or beside one of the largest cells that have a point to be refined: no other
+/// sheet says anything of such a point.
+fn wanted(sorted: &Sorted) -> Vec<bool> {
+    let mut wanted = vec![sorted.shots.len() == sorted.n_own; sorted.shots.len()];
+    let Some(level) = sorted.levels.last().filter(|_| !wanted.contains(&true)) else {
+        return wanted;
+    };
+    let n = level.n_cells() as u32;
+    let has_own = |number| {
+        sorted.shots[level.points(number)]
+            .iter()
+            .any(|s| s.place != NONE)
+    };
+    let own: Vec<bool> = (0..n).map(has_own).collect();
+    let mut around = level.around(0);
+    for place in 0..level.n_cells() {
+        let near = around.of(place);
+        if near.iter().any(|&c| c != NONE && own[c as usize]) {
+            wanted[level.points(level.in_rows(place))].fill(true);
+        }
+    }
+    wanted
+}
+
+/// The noise of the ranges as the smooth surfaces show it.
+pub(crate) fn noise_of(sorted: &Sorted) -> Option<Noise> {
     let mut found = Vec::new();
     for level in &sorted.levels {
-        let cells: Vec<u32> = (0..level.n_cells() as u32).step_by(NOISE_EVERY).collect();
-        let of_level: Vec<Option<(u8, f64)>> = cells
+        let every = (level.n_cells() / MOST_CELLS).max(NOISE_EVERY);
+        let places: Vec<usize> = (0..level.n_cells()).step_by(every).collect();
+        let of_level: Vec<Option<(u8, f64)>> = places
             .par_iter()
             .with_min_len(CHUNK)
-            .map_init(Vec::new, |spots, &c| residual(sorted, level, c, spots))
+            .map_init(Vec::new, |spots, &place| {
+                residual(sorted, level, place, spots)
+            })
             .collect();
         found.extend(of_level.into_iter().flatten());
     }
@@ -121,8 +160,15 @@ fn noise_of(sorted: &Sorted) -> Option<Noise> {
 }
 
 /// Step of the range of a cell's points and the standard deviation of their residuals along the beams.
-fn residual(sorted: &Sorted, level: &Level, cell: u32, spots: &mut Vec<Spot>) -> Option<(u8, f64)> {
-    let (_, radius) = gather(sorted, level, cell, None, spots)?;
+fn residual(
+    sorted: &Sorted,
+    level: &Level,
+    place: usize,
+    spots: &mut Vec<Spot>,
+) -> Option<(u8, f64)> {
+    let cell = level.in_rows(place);
+    let around = level.around(place).of(place);
+    let (_, radius) = gather(sorted, level, cell, &around, None, spots)?;
     let normal = normal_of(spots)?;
     spots.retain(|s| s.beam.dot(&normal) < -NOISE_COSINE);
     if spots.len() < sorted.settings.enough / 2 {
@@ -142,24 +188,23 @@ fn gather(
     sorted: &Sorted,
     level: &Level,
     cell: u32,
+    around: &[u32; N_AROUND],
     noise: Option<&Noise>,
     spots: &mut Vec<Spot>,
 ) -> Option<(Vector3<f64>, f64)> {
+    let around = around.iter().filter(|&&c| c != NONE);
+    let total: usize = around.clone().map(|&c| level.points(c).len()).sum();
+    if total < sorted.settings.enough {
+        return None;
+    }
     let own = level.points(cell);
     let place = |i: usize| Vector3::from(sorted.shots[i].at.map(f64::from));
     let middle = own.clone().fold(Vector3::zeros(), |sum, i| sum + place(i)) / own.len() as f64;
     let radius = REACH * level.edge;
-    let around: Vec<u32> = level
-        .around(level.cell_of(&place(own.start).into()))
-        .collect();
-    let total: usize = around.iter().map(|&c| level.points(c).len()).sum();
-    if total < sorted.settings.enough {
-        return None;
-    }
     spots.clear();
     let every = total.div_ceil(MOST_SPOTS);
     let mut skipped = 0;
-    for cell in around {
+    for &cell in around {
         let points = level.points(cell);
         for i in (points.start + skipped..points.end).step_by(every) {
             let (shot, at) = (&sorted.shots[i], place(i) - middle);
@@ -168,7 +213,7 @@ fn gather(
                     at,
                     beam: Vector3::from(shot.beam.map(f64::from)),
                     sigma: noise.map_or(UNIT, |n| n.of_step(shot.step)),
-                    pass: (usize::from(shot.pass) % N_PASSES) as u8,
+                    pass: shot.pass,
                 });
             }
         }
@@ -182,10 +227,11 @@ fn pieces_of(
     sorted: &Sorted,
     level: &Level,
     cell: u32,
+    around: &[u32; N_AROUND],
     noise: &Noise,
     spots: &mut Vec<Spot>,
 ) -> Vec<Piece> {
-    let Some((middle, radius)) = gather(sorted, level, cell, Some(noise), spots) else {
+    let Some((middle, radius)) = gather(sorted, level, cell, around, Some(noise), spots) else {
         return Vec::new();
     };
     let Some(normal) = normal_of(spots) else {

@@ -67,11 +67,9 @@ impl Map {
 
     fn refine(&self) -> Refined {
         let mut sample = Sample::new(SETTINGS);
-        sample.add(&self.points, &self.beams, &self.ranges, &self.times);
-        sample
-            .fit(None)
-            .unwrap()
-            .refine(&self.points, &self.beams, &self.ranges)
+        let own = vec![true; self.points.len()];
+        sample.add(&self.points, &self.beams, &self.ranges, &self.times, &own);
+        sample.refine(None).unwrap()
     }
 
     fn moved(&self) -> Vec<Point> {
@@ -374,6 +372,21 @@ fn what_the_passes_share_stays_in_the_stated_deviation() {
     let (mean, _) = statistics(sigmas.iter().map(|s| f64::from(*s)));
     // So many passes of 10 mm each leave 0.9 mm that no averaging of points takes away.
     assert!(mean > 0.0009, "{mean}");
+}
+
+#[test]
+fn points_around_help_as_much_as_if_they_were_refined_too() {
+    let map = map_of(12_000, |r| floor(r, 1.0), above);
+    let all = map.refine();
+    let own: Vec<bool> = map.points.iter().map(|p| p[0] < 0.1).collect();
+    let mut sample = Sample::new(SETTINGS);
+    sample.add(&map.points, &map.beams, &map.ranges, &map.times, &own);
+    let found = sample.refine(Some(all.noise.clone())).unwrap();
+    let expected: Vec<f32> = (0..own.len())
+        .filter(|&i| own[i])
+        .map(|i| all.moves[i])
+        .collect();
+    assert_eq!(found.moves, expected);
 }
 
 #[test]

@@ -3,9 +3,8 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,12 +12,15 @@ import numpy as np
 from bentwing import _core
 from bentwing.base.array_spool import ArraySpool, columns_of
 from bentwing.map.chunk import MapChunk
+from bentwing.map.slabs import Extent
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
+    from collections.abc import Iterable, Iterator
     from pathlib import Path
 
     from numpy.typing import NDArray
+
+    from bentwing.map.slabs import Slabs
 
 EDGE = 0.05  # m, of the smallest cells
 N_LEVELS = 4  # sizes of cells, each twice as large as the one before
@@ -28,10 +30,9 @@ MOST_NOISE = 0.03  # m, of a range; what looks noisier is the shape of things
 # s; what is measured within it shares the error of the trajectory. A head that turns sees a surface in it
 # once.
 PASS_LENGTH = 0.25
-MOST_POINTS = 3_000_000  # that surfaces are found from at a time, about 150 bytes each
-# m; surfaces reach one and a half of the largest cells from their middle, which may be a cell away.
-HALO = 1.5
+MOST_POINTS = 4_000_000  # that are looked at together, about 100 bytes each
 _HELD = 32_000_000  # bytes of moves that need no file
+_NEEDED = ("points", "beams", "ranges", "times")
 _STEP = 1e-4  # m, of the histograms of moves and standard deviations
 _N_STEPS = 1000
 
@@ -47,12 +48,12 @@ def refine(
     """Move every point along its own beam to where it most probably is.
 
     All chunks pass once before the first one comes out; meanwhile they are on the disk. A large map is
-    refined in slabs.
+    refined in slabs, with the points around each.
 
     Parameters
     ----------
     chunks : with the beams of their points and the ranges as measured
-    folder : of the temporary file, about 70 bytes per point
+    folder : of the temporary files, about 150 bytes per point
     counts : receives `map.refined`, the points that were moved
     record : receives `moved`, the share, and its medians `move`, `sigma_before` and `sigma`, m
     threads : default: all cores
@@ -64,23 +65,28 @@ def refine(
     tally = Tally()
     with ExitStack() as stack:
         spool = stack.enter_context(ArraySpool(folder))
-        layout = _Layout()
+        extent = Extent()
         for chunk in filter(len, chunks):
-            layout.add(chunk)
+            _beams(chunk)
+            extent.add(chunk.points)
             spool.add(columns_of(chunk))
-        slabs = layout.slabs()
-        refined = [stack.enter_context(ArraySpool(folder, held=_HELD // len(slabs))) for _ in slabs]
+        slabs = extent.slabs(MOST_POINTS)
+        groups = [stack.enter_context(ArraySpool(folder)) for _ in range(slabs.n_groups)]
+        sizes = _distribute(spool, slabs, groups)
+        held = _HELD // max(len(groups), 1)
+        refined = [stack.enter_context(ArraySpool(folder, held=held)) for _ in groups]
         noise: _core.RangeNoise | None = None
-        for slab in sorted(slabs, key=lambda slab: -slab.n_points):
-            near = layout.near(slab)
-            tables = lambda near=near: map(_chunk, spool.tables(near))  # noqa: E731 - as short as a name
-            surfaces = _surfaces(tables, slab, noise, threads or 0)
-            noise = noise if surfaces is None else surfaces.noise
-            for found in _moves(tables, slab, surfaces, threads or 0):
-                refined[slab.number].add(found)
+        # Of the largest group the noise is learnt.
+        for number in sorted(range(len(groups)), key=lambda number: -sum(sizes[number])):
+            found = _sample(groups[number]).refine(noise=noise, threads=threads or 0)
+            groups[number].close()
+            noise, shift, sigma = found or _unmoved(noise, sum(sizes[number]))
+            for rows in _pieces(sizes[number]):
+                refined[number].add({"shift": shift[rows], "sigma": sigma[rows]})
         moves = [own.tables() for own in refined]
         for columns in spool.tables():
-            moved = _moved(_chunk(columns), slabs, moves)
+            chunk = MapChunk(**columns)
+            moved = _moved(chunk, slabs, moves)
             tally.add(moved, noise)
             yield moved
     if counts is not None:
@@ -89,64 +95,18 @@ def refine(
         record.update(tally.to_json())
 
 
-@dataclass(frozen=True, slots=True)
-class _Slab:
-    """Points between two coordinates along an axis; the first and the last slab go on without end."""
-
-    number: int
-    axis: int
-    low: float
-    high: float
-    n_points: int
-
-    def holds(self, points: NDArray[np.float64], halo: float = 0.0) -> NDArray[np.bool_]:
-        along = points[:, self.axis]
-        inside: NDArray[np.bool_] = (along >= self.low - halo) & (along < self.high + halo)
-        return inside
+def _distribute(spool: ArraySpool, slabs: Slabs, groups: list[ArraySpool]) -> list[list[int]]:
+    """Give each group its points; return how many of each chunk are the group's own."""
+    sizes: list[list[int]] = [[] for _ in groups]
+    for columns in spool.tables():
+        for part in slabs.parts(columns["points"]):
+            chosen = {name: columns[name].take(part.rows, axis=0) for name in _NEEDED}
+            groups[part.number].add({**chosen, "own": part.own})
+            sizes[part.number].append(int(np.count_nonzero(part.own)))
+    return sizes
 
 
-class _Layout:
-    """How many points there are in every metre along each axis."""
-
-    def __init__(self) -> None:
-        self._axes: tuple[Counter[int], ...] = (Counter(), Counter(), Counter())
-        self._bounds: list[tuple[NDArray[np.float64], NDArray[np.float64]]] = []
-
-    def add(self, chunk: MapChunk) -> None:
-        self._bounds.append((chunk.points.min(axis=0), chunk.points.max(axis=0)))
-        for axis, counted in enumerate(self._axes):
-            metres, numbers = np.unique(np.floor(chunk.points[:, axis]), return_counts=True)
-            counted.update(dict(zip(metres.astype(int).tolist(), numbers.tolist(), strict=True)))
-
-    def near(self, slab: _Slab) -> list[int]:
-        """Return the numbers of the chunks of which some may be in a slab or around it."""
-        low, high, axis = slab.low - HALO, slab.high + HALO, slab.axis
-        return [i for i, (a, b) in enumerate(self._bounds) if a[axis] < high and b[axis] >= low]
-
-    def slabs(self) -> list[_Slab]:
-        """Cut along the longest axis, so that a slab has `MOST_POINTS` where a metre has not more."""
-        axis = int(np.argmax([len(counted) for counted in self._axes]))
-        cuts, sizes = [-np.inf], [0]
-        for metre, number in sorted(self._axes[axis].items()):
-            if sizes[-1] and sizes[-1] + number > MOST_POINTS:
-                cuts.append(float(metre))
-                sizes.append(0)
-            sizes[-1] += number
-        ends = [*cuts[1:], np.inf]
-        return [
-            _Slab(i, axis, low, high, size)
-            for i, (low, high, size) in enumerate(zip(cuts, ends, sizes, strict=True))
-        ]
-
-
-def _surfaces(
-    tables: Callable[[], Iterator[MapChunk]],
-    slab: _Slab,
-    noise: _core.RangeNoise | None,
-    threads: int,
-) -> _core.Surfaces | None:
-    """Find the surfaces in a slab and around it; of too many points every k-th tells them."""
-    every = -(-slab.n_points // MOST_POINTS)
+def _sample(group: ArraySpool) -> _core.SurfaceSample:
     sample = _core.SurfaceSample(
         edge=EDGE,
         n_levels=N_LEVELS,
@@ -155,42 +115,30 @@ def _surfaces(
         most_noise=MOST_NOISE,
         pass_length=PASS_LENGTH,
     )
-    for chunk in tables():
-        chosen = slab.holds(chunk.points, HALO)
-        chosen &= np.cumsum(chosen) % every == 0
-        near = chunk.where(chosen)
-        sample.add(near.points, beams=_beams(near), ranges=near.ranges, times=near.times)
-    return sample.fit(noise=noise, threads=threads)
+    for columns in group.tables():
+        sample.add(**columns)
+    return sample
 
 
-def _moves(
-    tables: Callable[[], Iterator[MapChunk]],
-    slab: _Slab,
-    surfaces: _core.Surfaces | None,
-    threads: int,
-) -> Iterator[dict[str, NDArray[np.float32]]]:
-    """Yield how far the points of a slab move, and the standard deviation that is left."""
-    for chunk in tables():
-        own = chunk.where(slab.holds(chunk.points))
-        if surfaces is None:
-            shift, sigma = np.zeros(len(own), np.float32), np.full(len(own), np.nan, np.float32)
-        else:
-            shift, sigma = surfaces.refine(
-                own.points, beams=_beams(own), ranges=own.ranges, threads=threads
-            )
-        if len(own):
-            yield {"shift": shift, "sigma": sigma}
+def _unmoved(
+    noise: _core.RangeNoise | None, n: int
+) -> tuple[_core.RangeNoise | None, NDArray[np.float32], NDArray[np.float32]]:
+    """Return what is known of points without surfaces."""
+    return noise, np.zeros(n, np.float32), np.full(n, np.nan, np.float32)
+
+
+def _pieces(sizes: list[int]) -> Iterator[slice]:
+    ends = np.cumsum([0, *sizes]).tolist()
+    return map(slice, ends[:-1], ends[1:])
 
 
 def _moved(
-    chunk: MapChunk, slabs: list[_Slab], moves: list[Iterator[dict[str, NDArray[np.float32]]]]
+    chunk: MapChunk, slabs: Slabs, moves: list[Iterator[dict[str, NDArray[np.float32]]]]
 ) -> MapChunk:
     shift, sigma = np.empty(len(chunk), np.float32), np.empty(len(chunk), np.float32)
-    for slab in slabs:
-        inside = slab.holds(chunk.points)
-        if inside.any():
-            found = next(moves[slab.number])
-            shift[inside], sigma[inside] = found["shift"], found["sigma"]
+    for part in slabs.parts(chunk.points):
+        found, own = next(moves[part.number]), part.rows[part.own]
+        shift[own], sigma[own] = found["shift"], found["sigma"]
     points = chunk.points + _beams(chunk) * shift[:, None].astype(np.float64)
     return replace(chunk, points=points, shift=shift, sigma=sigma)
 
@@ -236,10 +184,6 @@ def _median(histogram: NDArray[np.int64]) -> float | None:
     if not total:
         return None
     return _STEP * (int(np.searchsorted(np.cumsum(histogram), total / 2)) + 0.5)
-
-
-def _chunk(columns: dict[str, NDArray[Any]]) -> MapChunk:
-    return MapChunk(**columns)
 
 
 def _beams(chunk: MapChunk) -> NDArray[np.float32]:

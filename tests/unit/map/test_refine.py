@@ -68,7 +68,7 @@ def test_points_come_to_the_floor_along_their_beams_and_in_their_order(tmp_path)
 
 def test_a_map_in_slabs_is_as_good_as_one_in_one_piece(tmp_path, monkeypatch):
     whole = refined(tmp_path)
-    monkeypatch.setattr(refining, "MOST_POINTS", 20_000)
+    monkeypatch.setattr(refining, "MOST_POINTS", 40_000)
     slabs = refined(tmp_path)
     assert heights(slabs).std() == pytest.approx(heights(whole).std(), rel=0.1)
     # Nothing of the order is lost, and where slabs meet there is no edge.
@@ -125,10 +125,11 @@ def test_a_sample_is_used_once():
     sample = _core.SurfaceSample(
         edge=0.05, n_levels=4, enough=80, fewest_passes=5.0, most_noise=0.03, pass_length=0.5
     )
-    sample.add(chunk.points, beams=chunk.beams, ranges=chunk.ranges, times=chunk.times)
-    sample.fit()
+    own = np.ones(len(chunk), np.bool_)
+    sample.add(chunk.points, beams=chunk.beams, ranges=chunk.ranges, times=chunk.times, own=own)
+    sample.refine()
     with pytest.raises(RuntimeError, match="used up"):
-        sample.fit()
+        sample.refine()
     with pytest.raises(ValueError, match="edge: expected a positive number"):
         _core.SurfaceSample(
             edge=0.0, n_levels=4, enough=80, fewest_passes=5.0, most_noise=0.03, pass_length=0.5

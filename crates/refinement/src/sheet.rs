@@ -18,10 +18,14 @@ const ROUNDS: usize = 2;
 const CLEAN: f64 = 3.75;
 /// Slope from which on the frame is turned to the plane that was found.
 const STEEP: f64 = 0.1;
+/// Slope at the edge from which on a surface bends otherwise than a quadric: a cylinder of which more is
+/// taken looks too thin. Then less is taken, but not less than this share of the radius.
+const STEEPEST: f64 = 0.8;
+const NARROWEST: f64 = 0.5;
 const PLANE: usize = 3;
 const QUADRIC: usize = 6;
 /// A surface cannot be told from another one that a beam meets at less than this cosine.
-const GRAZING: f64 = 0.05;
+pub(crate) const GRAZING: f64 = 0.05;
 /// Price of a parameter.
 const CURVES: f64 = 2.0;
 
@@ -104,13 +108,21 @@ impl Sheet {
             weights.extend(locals.iter().map(|l| l.inverse));
             sums = Sums::of(&locals, &weights);
         }
+        let narrower = sheet.narrower(&sums);
+        if let Some(radius) = narrower {
+            sheet.radius = radius;
+            locals = sheet.locals(spots);
+            weights.clear();
+            weights.extend(locals.iter().map(|l| l.inverse));
+            sums = Sums::of(&locals, &weights);
+        }
         let mut residuals = vec![0.0; locals.len()];
         let mut robust = false;
         for round in 0.. {
             if !sums.is_wide() {
                 return None;
             }
-            sheet.choose(&sums)?;
+            sheet.choose(&sums, narrower.is_some())?;
             for (r, l) in residuals.iter_mut().zip(&locals) {
                 *r = sheet.normalized(l);
             }
@@ -157,6 +169,15 @@ impl Sheet {
         self.axes = frame(&self.normal);
     }
 
+    /// The radius within which a quadric is no steeper than its kind can follow, if that is smaller.
+    fn narrower(&mut self, sums: &Sums) -> Option<f64> {
+        self.choose(sums, false)?;
+        let h = &self.heights;
+        let bend = 0.5 * (h[3] - h[5]).hypot(h[4]) + 0.5 * (h[3] + h[5]).abs();
+        let slope = 2.0 * bend / self.radius;
+        (slope > STEEPEST).then(|| self.radius * (STEEPEST / slope).max(NARROWEST))
+    }
+
     fn face(&mut self) {
         let up = Vector3::new(
             -self.heights[1] / self.radius,
@@ -167,8 +188,8 @@ impl Sheet {
     }
 
     /// Plane or quadric, by Akaike's information criterion: a curve that is too weak for the Bayesian one
-    /// would still shift a cylinder by a millimetre.
-    fn choose(&mut self, sums: &Sums) -> Option<()> {
+    /// would still shift a cylinder by a millimetre. A quadric where the points are known to bend.
+    fn choose(&mut self, sums: &Sums, bends: bool) -> Option<()> {
         let plane = sums.plane()?;
         (self.heights, self.n_parameters) = (plane, PLANE);
         let freedom = sums.n - QUADRIC as f64;
@@ -178,7 +199,7 @@ impl Sheet {
         if let Some(quadric) = sums.quadric() {
             let (flat, curved) = (sums.misfit(&plane), sums.misfit(&quadric));
             let left = (curved / freedom).max(1.0);
-            if (flat - curved) / left > CURVES * (QUADRIC - PLANE) as f64 {
+            if bends || (flat - curved) / left > CURVES * (QUADRIC - PLANE) as f64 {
                 (self.heights, self.n_parameters) = (quadric, QUADRIC);
             }
         }

@@ -2,9 +2,9 @@
 //! Two sheets that meet at a line: a crease, or a step.
 
 use bentwing_trajectory::so3;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 
-use crate::sheet::{Sheet, Spot, normal_of};
+use crate::sheet::{GRAZING, Sheet, Spot, normal_of};
 
 const N_DIRECTIONS: usize = 6;
 const N_BINS: usize = 10;
@@ -15,8 +15,10 @@ const FEWEST: usize = 8;
 const CREASE: f64 = 0.15;
 /// Parameters of the line.
 const LINE: usize = 2;
-/// Steps of Newton's method.
-const NEWTON: usize = 5;
+/// Two planes are tried where they explain more than this, in logarithms of the number of spots.
+const PROMISING: f64 = 1.0;
+/// Share of the spread of spots along and across that shows a direction of its own.
+const FLAT: f64 = 1e-6;
 /// Turns of the line of a step that are tried once more, rad.
 const TURNS: [f64; 5] = [-0.2, -0.1, 0.0, 0.1, 0.2];
 
@@ -51,7 +53,7 @@ pub(crate) fn split(
     normal: &Vector3<f64>,
     one: Option<&Sheet>,
 ) -> Option<Pair> {
-    let coarse = best_line(spots, normal)?;
+    let coarse = best_line(spots, radius, normal)?;
     let pair = fit_halves(spots, radius, coarse)?;
     let lines = [crease(&pair), step(spots, &pair, normal)];
     let others = lines
@@ -91,24 +93,26 @@ fn fit_halves(spots: &[Spot], radius: f64, half: Half) -> Option<Pair> {
     Some([(fit(&a)?, half), (fit(&b)?, half.other())])
 }
 
-/// The line that leaves two planes with the least squares.
-fn best_line(spots: &[Spot], normal: &Vector3<f64>) -> Option<Half> {
+/// The line that leaves two planes with the least squares, unless even they explain the spots hardly better
+/// than one does.
+fn best_line(spots: &[Spot], radius: f64, normal: &Vector3<f64>) -> Option<Half> {
     let [u, v] = so3::orthogonal_pair(normal);
-    let reach = spots
-        .iter()
-        .map(|s| s.at.norm())
-        .fold(0.0, f64::max)
-        .max(1e-6);
+    // In small squares first, of which each side of a line has some.
+    let mut squares = [Sums::default(); N_BINS * N_BINS];
+    for s in spots {
+        let (p, q) = (u.dot(&s.at) / radius, v.dot(&s.at) / radius);
+        squares[bin_of(p) * N_BINS + bin_of(q)].add(p, q, s, normal);
+    }
+    let all = squares.iter().fold(Sums::default(), |sum, b| sum.plus(b));
     let mut best: Option<(f64, Half)> = None;
     for k in 0..N_DIRECTIONS {
         let (sin, cos) = (std::f64::consts::PI * k as f64 / N_DIRECTIONS as f64).sin_cos();
-        let direction = u * cos + v * sin;
         let mut bins = [Sums::default(); N_BINS];
-        for s in spots {
-            let place = (direction.dot(&s.at) / reach + 1.0) * 0.5 * N_BINS as f64;
-            bins[(place as usize).min(N_BINS - 1)].add(s);
+        for (i, sums) in squares.iter().enumerate().filter(|(_, s)| s.w > 0.0) {
+            let [p, q] = [i / N_BINS, i % N_BINS].map(middle_of);
+            let bin = &mut bins[bin_of(cos * p + sin * q)];
+            *bin = bin.plus(sums);
         }
-        let all = bins.iter().fold(Sums::default(), |sum, b| sum.plus(b));
         let mut low = Sums::default();
         for (bin, sums) in bins.iter().enumerate().take(N_BINS - 1) {
             low = low.plus(sums);
@@ -116,27 +120,38 @@ fn best_line(spots: &[Spot], normal: &Vector3<f64>) -> Option<Half> {
             if low.w.min(high.w) < SMALLEST * all.w {
                 continue;
             }
-            let left = low.squares() + high.squares();
+            let left = low.misfit() + high.misfit();
             if best.is_none_or(|(least, _)| left < least) {
-                let offset = ((bin + 1) as f64 / N_BINS as f64 * 2.0 - 1.0) * reach;
+                let offset = (2.0 * (bin + 1) as f64 / N_BINS as f64 - 1.0) * radius;
+                let direction = u * cos + v * sin;
                 best = Some((left, Half { direction, offset }));
             }
         }
     }
-    best.map(|(_, half)| half)
+    let (left, half) = best?;
+    let scale = (left / all.n).max(1.0);
+    (all.misfit() - left > PROMISING * scale * all.n.max(1.0).ln()).then_some(half)
+}
+
+/// Of a coordinate over the radius.
+fn bin_of(c: f64) -> usize {
+    (((c + 1.0) * 0.5 * N_BINS as f64) as usize).min(N_BINS - 1)
+}
+
+fn middle_of(bin: usize) -> f64 {
+    (2 * bin + 1) as f64 / N_BINS as f64 - 1.0
 }
 
 /// The line of a step between two sheets, which leaves each spot on the one that it fits.
 fn step(spots: &[Spot], pair: &Pair, normal: &Vector3<f64>) -> Option<Half> {
     let (a, b) = (&pair[0].0, &pair[1].0);
+    let nearer: Vec<f64> = spots.iter().map(|s| a.cost_of(s) - b.cost_of(s)).collect();
     let across = normal.cross(&pair[0].1.direction);
     let mut best: Option<(f64, Half)> = None;
     for turn in TURNS {
         let direction = (pair[0].1.direction + across * turn).normalize();
-        let mut order: Vec<(f64, f64)> = spots
-            .iter()
-            .map(|s| (direction.dot(&s.at), a.cost_of(s) - b.cost_of(s)))
-            .collect();
+        let places = spots.iter().map(|s| direction.dot(&s.at));
+        let mut order: Vec<(f64, f64)> = places.zip(nearer.iter().copied()).collect();
         order.sort_unstable_by(|x, y| x.0.total_cmp(&y.0));
         // Beginning with all spots in the half of the first sheet, those below the line leave it.
         let mut gained = 0.0;
@@ -169,85 +184,100 @@ fn crease(pair: &Pair) -> Option<Half> {
     Some(if inside > 0.0 { half } else { half.other() })
 }
 
-/// Moments of spots.
+/// Moments of spots beside a plane: of their places along it over the radius, and of their heights.
 #[derive(Clone, Copy, Default)]
 struct Sums {
+    /// Of the weights by the distance.
+    n: f64,
+    /// These over the variances.
     w: f64,
-    first: Vector3<f64>,
-    second: Matrix3<f64>,
+    /// u, v, h.
+    first: [f64; 3],
+    /// uu, uv, vv, uh, vh, hh.
+    second: [f64; 6],
 }
 
 impl Sums {
-    fn add(&mut self, s: &Spot) {
-        let w = 1.0 / (s.sigma * s.sigma);
+    fn add(&mut self, u: f64, v: f64, s: &Spot, normal: &Vector3<f64>) {
+        let h = normal.dot(&s.at);
+        let across = normal.dot(&s.beam).abs().max(GRAZING) * s.sigma;
+        let share = (1.0 - u * u - v * v).max(0.0);
+        let w = share * share / (across * across);
+        self.n += share * share;
         self.w += w;
-        self.first += s.at * w;
-        self.second += s.at * s.at.transpose() * w;
+        for (sum, value) in self.first.iter_mut().zip([u, v, h]) {
+            *sum += w * value;
+        }
+        let products = [u * u, u * v, v * v, u * h, v * h, h * h];
+        for (sum, value) in self.second.iter_mut().zip(products) {
+            *sum += w * value;
+        }
     }
 
     fn plus(&self, o: &Self) -> Self {
         Self {
+            n: self.n + o.n,
             w: self.w + o.w,
-            first: self.first + o.first,
-            second: self.second + o.second,
+            first: std::array::from_fn(|k| self.first[k] + o.first[k]),
+            second: std::array::from_fn(|k| self.second[k] + o.second[k]),
         }
     }
 
     fn minus(&self, o: &Self) -> Self {
         Self {
+            n: self.n - o.n,
             w: self.w - o.w,
-            first: self.first - o.first,
-            second: self.second - o.second,
+            first: std::array::from_fn(|k| self.first[k] - o.first[k]),
+            second: std::array::from_fn(|k| self.second[k] - o.second[k]),
         }
     }
 
-    /// Squares across the best plane.
-    fn squares(&self) -> f64 {
-        let mean = self.first / self.w;
-        let covariance = self.second / self.w - mean * mean.transpose();
-        smallest_eigenvalue(&covariance) * self.w
+    /// Squares of the heights over the best plane, over their variances.
+    fn misfit(&self) -> f64 {
+        let [u, v, h] = self.first.map(|s| s / self.w);
+        let [uu, uv, vv, uh, vh, hh] = self.second.map(|s| s / self.w);
+        let (uu, uv, vv) = (uu - u * u, uv - u * v, vv - v * v);
+        let (uh, vh, hh) = (uh - u * h, vh - v * h, hh - h * h);
+        let determinant = uu * vv - uv * uv;
+        // What lies on a line leaves one slope free.
+        let explained = if determinant > FLAT * uu * vv {
+            (uh * (vv * uh - uv * vh) + vh * (uu * vh - uv * uh)) / determinant
+        } else {
+            0.0
+        };
+        (hh - explained).max(0.0) * self.w
     }
-}
-
-/// Of a covariance, by Newton's method: below its smallest root the characteristic polynomial is steep and
-/// bends away, so that the steps from 0 never pass the root. Several times as fast as the trigonometric
-/// formula.
-fn smallest_eigenvalue(a: &Matrix3<f64>) -> f64 {
-    let trace = a.trace();
-    let minors = a[(0, 0)] * a[(1, 1)] - a[(0, 1)] * a[(0, 1)] + a[(0, 0)] * a[(2, 2)]
-        - a[(0, 2)] * a[(0, 2)]
-        + a[(1, 1)] * a[(2, 2)]
-        - a[(1, 2)] * a[(1, 2)];
-    let determinant = a.determinant();
-    let mut root = 0.0;
-    for _ in 0..NEWTON {
-        let value = ((root - trace) * root + minors) * root - determinant;
-        let slope = (3.0 * root - 2.0 * trace) * root + minors;
-        if slope <= 0.0 {
-            break;
-        }
-        root -= value / slope;
-    }
-    root.max(0.0)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bentwing_voxels::sym3;
-    use nalgebra::UnitQuaternion;
     use proptest::prelude::*;
 
     proptest! {
         #[test]
-        fn the_smallest_eigenvalue_is_that_of_the_formula(
-            small in 1e-6..1e-3_f64, f2 in 1.5..100.0_f64, f3 in 1.0..10.0_f64,
-            a in -3.0..3.0_f64, b in -3.0..3.0_f64, c in -3.0..3.0_f64,
+        fn the_misfit_is_what_two_slopes_and_a_height_cannot_explain(
+            slopes in prop::array::uniform3(-1.0..1.0_f64),
+            off in prop::collection::vec(-0.1..0.1_f64, 20),
         ) {
-            let values = Vector3::new(small, small * f2, small * f2 * f3);
-            let R = UnitQuaternion::from_euler_angles(a, b, c).to_rotation_matrix().into_inner();
-            let m = R * Matrix3::from_diagonal(&values) * R.transpose();
-            prop_assert!((smallest_eigenvalue(&m) - sym3::eigen(&m).values[0]).abs() < 1e-2 * small);
+            let spot = |i: usize, off: f64| {
+                let (u, v) = ((i % 5) as f64 * 0.2 - 0.4, (i / 5) as f64 * 0.2 - 0.3);
+                let height = slopes[0] + slopes[1] * u + slopes[2] * v + off;
+                Spot { at: Vector3::new(u, v, height), beam: -Vector3::z(), sigma: 0.5, pass: 0 }
+            };
+            let of = |scale: f64| {
+                let mut sums = Sums::default();
+                for (i, &off) in off.iter().enumerate() {
+                    let s = spot(i, scale * off);
+                    sums.add(s.at[0], s.at[1], &s, &Vector3::z());
+                }
+                sums
+            };
+            prop_assert!(of(0.0).misfit() < 1e-9);
+            // Squares grow as squares do, and none is more than the heights themselves.
+            prop_assert!((of(2.0).misfit() - 4.0 * of(1.0).misfit()).abs() < 1e-9);
+            let squares: f64 = off.iter().map(|o| o * o / 0.25).sum();
+            prop_assert!(of(1.0).misfit() <= squares + 1e-9);
         }
     }
 }

@@ -9,6 +9,7 @@ mod refine;
 mod sample;
 mod sheet;
 mod split;
+mod spots;
 mod surfaces;
 
 pub use noise::Noise;

@@ -5,6 +5,7 @@ use nalgebra::Vector3;
 
 use crate::sheet::Sheet;
 use crate::split::Half;
+use crate::spots::dot;
 
 /// Less than this cosine between beam and normal tells nothing about a range.
 const GRAZING: f32 = 0.05;
@@ -88,9 +89,4 @@ impl Piece {
             variance: (1.0 - trust) * sigma * sigma,
         })
     }
-}
-
-#[inline]
-fn dot(a: &[f32; 3], b: &[f32; 3]) -> f32 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }

@@ -2,20 +2,23 @@
 //! One smooth piece of surface through noisy points: a plane, or a quadric where it curves.
 
 use bentwing_trajectory::so3;
-use bentwing_voxels::{MIN_WIDTH, Moments};
+use bentwing_voxels::MIN_WIDTH;
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
+use wide::f32x8;
+
+use crate::spots::{Block, Spots, add, total};
 
 /// Passes are told apart by so many bins.
 pub(crate) const N_PASSES: usize = 64;
 /// Residuals of so many standard deviations count no more (Tukey).
-const REJECTED: f64 = 4.685;
+const REJECTED: f32 = 4.685;
 /// Mean square of normal residuals by these weights.
 const TUKEY_VARIANCE: f64 = 0.829;
 /// Standard deviation of a normal distribution over its median absolute value.
-const MAD_TO_STD: f64 = 1.4826;
+const MAD_TO_STD: f32 = 1.4826;
 const ROUNDS: usize = 2;
 /// Where no residual is larger, none needs less weight.
-const CLEAN: f64 = 3.75;
+const CLEAN: f32 = 3.75;
 /// Slope from which on the frame is turned to the plane that was found.
 const STEEP: f64 = 0.1;
 /// Slope at the edge from which on a surface bends otherwise than a quadric: a cylinder of which more is
@@ -25,21 +28,9 @@ const NARROWEST: f64 = 0.5;
 const PLANE: usize = 3;
 const QUADRIC: usize = 6;
 /// A surface cannot be told from another one that a beam meets at less than this cosine.
-pub(crate) const GRAZING: f64 = 0.05;
+pub(crate) const GRAZING: f32 = 0.05;
 /// Price of a parameter.
 const CURVES: f64 = 2.0;
-
-/// A point near the middle of a piece.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Spot {
-    /// From the middle, m.
-    pub at: Vector3<f64>,
-    /// Unit direction of the beam.
-    pub beam: Vector3<f64>,
-    /// Of the range, m.
-    pub sigma: f64,
-    pub pass: u8,
-}
 
 /// A piece of surface; all relative to the middle of its points.
 #[derive(Clone, Copy, Debug)]
@@ -67,22 +58,54 @@ pub(crate) struct Sheet {
     pub scale: f64,
 }
 
-/// A spot in the axes of a sheet.
+/// Spots in the axes of a sheet.
 #[derive(Clone, Copy, Debug)]
 struct Local {
-    u: f64,
-    v: f64,
-    height: f64,
-    beam: Vector3<f64>,
-    sigma: f64,
-    /// By its distance, and this over the variance across.
-    weight: f64,
-    inverse: f64,
+    /// Along the surface, over the radius.
+    u: f32x8,
+    v: f32x8,
+    height: f32x8,
+    beam: [f32x8; 3],
+    sigma: f32x8,
+    /// One, or zero where there is no spot.
+    is: f32x8,
+    /// By the distance.
+    share: f32x8,
+    /// Variance of the height.
+    variance: f32x8,
+    /// In the sums.
+    weight: f32x8,
+    /// Over the standard deviations.
+    residual: f32x8,
+}
+
+/// What a sheet may be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    Any,
+    /// A quadric.
+    Bent,
 }
 
 impl Sheet {
     /// The sheet through spots, if they have one; `normal` is a guess.
-    pub(crate) fn fit(spots: &[Spot], radius: f64, normal: &Vector3<f64>) -> Option<Self> {
+    pub(crate) fn fit(spots: &Spots, radius: f64, normal: &Vector3<f64>) -> Option<Self> {
+        Self::fit_as(spots, radius, normal, Kind::Any)
+    }
+
+    /// The same within a radius that a quadric can follow, where this one bends more.
+    pub(crate) fn narrower(&self, spots: &Spots) -> Option<Self> {
+        let h = &self.heights;
+        let bend = 0.5 * (h[3] - h[5]).hypot(h[4]) + 0.5 * (h[3] + h[5]).abs();
+        let slope = 2.0 * bend / self.radius;
+        if slope <= STEEPEST {
+            return None;
+        }
+        let radius = self.radius * (STEEPEST / slope).max(NARROWEST);
+        Self::fit_as(spots, radius, &self.normal, Kind::Bent)
+    }
+
+    fn fit_as(spots: &Spots, radius: f64, normal: &Vector3<f64>, kind: Kind) -> Option<Self> {
         let mut sheet = Self {
             axes: frame(normal),
             heights: Vector6::zeros(),
@@ -98,68 +121,61 @@ impl Sheet {
             scale: 1.0,
         };
         let mut locals = sheet.locals(spots);
-        let mut weights: Vec<f64> = locals.iter().map(|l| l.inverse).collect();
-        let mut sums = Sums::of(&locals, &weights);
+        let mut sums = Sums::of(&locals);
         let first = sums.plane()?;
         if first.fixed_rows::<2>(1).norm() > STEEP * radius {
             sheet.turn(&first);
             locals = sheet.locals(spots);
-            weights.clear();
-            weights.extend(locals.iter().map(|l| l.inverse));
-            sums = Sums::of(&locals, &weights);
+            sums = Sums::of(&locals);
         }
-        let narrower = sheet.narrower(&sums);
-        if let Some(radius) = narrower {
-            sheet.radius = radius;
-            locals = sheet.locals(spots);
-            weights.clear();
-            weights.extend(locals.iter().map(|l| l.inverse));
-            sums = Sums::of(&locals, &weights);
-        }
-        let mut residuals = vec![0.0; locals.len()];
         let mut robust = false;
         for round in 0.. {
             if !sums.is_wide() {
                 return None;
             }
-            sheet.choose(&sums, narrower.is_some())?;
-            for (r, l) in residuals.iter_mut().zip(&locals) {
-                *r = sheet.normalized(l);
-            }
-            if round == ROUNDS || !robust && residuals.iter().all(|r| r.abs() < CLEAN) {
+            sheet.choose(&sums, kind)?;
+            let largest = sheet.normalize(&mut locals);
+            if round == ROUNDS || !robust && largest < CLEAN {
                 break;
             }
-            reweight(&locals, &residuals, &mut weights);
+            reweight(&mut locals, spots.len());
             robust = true;
-            sums = Sums::of(&locals, &weights);
+            sums = Sums::of(&locals);
         }
         sheet.face();
         let variance = if robust { TUKEY_VARIANCE } else { 1.0 };
-        sheet.describe(spots, &locals, &weights, &residuals, variance);
+        sheet.describe(spots, &locals, variance);
         Some(sheet)
     }
 
-    fn locals(&self, spots: &[Spot]) -> Vec<Local> {
-        let (axes, per_metre) = (&self.axes, 1.0 / self.radius);
-        let local = |s: &Spot| {
-            let (at, beam) = (axes * s.at, axes * s.beam);
-            let across = beam[2].abs().max(GRAZING) * s.sigma;
-            let (u, v) = (at[0] * per_metre, at[1] * per_metre);
+    fn locals(&self, spots: &Spots) -> Vec<Local> {
+        let per_metre = 1.0 / self.radius as f32;
+        let axes = [0, 1, 2].map(|k| [0, 1, 2].map(|a| f32x8::splat(self.axes[(k, a)] as f32)));
+        let along = |c: &[f32x8; 3]| axes.map(|row| row[0] * c[0] + row[1] * c[1] + row[2] * c[2]);
+        let local = |b: &Block| {
+            let ([u, v, height], beam) = (along(&b.at()), along(&b.beam()));
+            let (u, v, sigma) = (u * per_metre, v * per_metre, f32x8::from(b.sigma));
             // By the distance along the surface alone: by that across it, what the noise brings nearer to
             // the middle would count more, and draw the surface there.
-            let share = (1.0 - u * u - v * v).max(0.0);
-            let weight = share * share;
+            let near = (1.0 - u * u - v * v).fast_max(f32x8::ZERO);
+            let is = f32x8::from(b.is);
+            let share = near * near * is;
+            let across = beam[2].abs().fast_max(f32x8::splat(GRAZING)) * sigma;
+            let variance = across * across;
             Local {
                 u,
                 v,
-                height: at[2],
+                height,
                 beam,
-                sigma: s.sigma,
-                weight,
-                inverse: weight / (across * across),
+                sigma,
+                is,
+                share,
+                variance,
+                weight: share / variance,
+                residual: f32x8::ZERO,
             }
         };
-        spots.iter().map(local).collect()
+        spots.blocks().iter().map(local).collect()
     }
 
     /// Turns the axes to a plane.
@@ -167,15 +183,6 @@ impl Sheet {
         let up = Vector3::new(-plane[1] / self.radius, -plane[2] / self.radius, 1.0);
         self.normal = (self.axes.transpose() * up).normalize();
         self.axes = frame(&self.normal);
-    }
-
-    /// The radius within which a quadric is no steeper than its kind can follow, if that is smaller.
-    fn narrower(&mut self, sums: &Sums) -> Option<f64> {
-        self.choose(sums, false)?;
-        let h = &self.heights;
-        let bend = 0.5 * (h[3] - h[5]).hypot(h[4]) + 0.5 * (h[3] + h[5]).abs();
-        let slope = 2.0 * bend / self.radius;
-        (slope > STEEPEST).then(|| self.radius * (STEEPEST / slope).max(NARROWEST))
     }
 
     fn face(&mut self) {
@@ -189,7 +196,7 @@ impl Sheet {
 
     /// Plane or quadric, by Akaike's information criterion: a curve that is too weak for the Bayesian one
     /// would still shift a cylinder by a millimetre. A quadric where the points are known to bend.
-    fn choose(&mut self, sums: &Sums, bends: bool) -> Option<()> {
+    fn choose(&mut self, sums: &Sums, kind: Kind) -> Option<()> {
         let plane = sums.plane()?;
         (self.heights, self.n_parameters) = (plane, PLANE);
         let freedom = sums.n - QUADRIC as f64;
@@ -199,37 +206,41 @@ impl Sheet {
         if let Some(quadric) = sums.quadric() {
             let (flat, curved) = (sums.misfit(&plane), sums.misfit(&quadric));
             let left = (curved / freedom).max(1.0);
-            if bends || (flat - curved) / left > CURVES * (QUADRIC - PLANE) as f64 {
+            if kind == Kind::Bent || (flat - curved) / left > CURVES * (QUADRIC - PLANE) as f64 {
                 (self.heights, self.n_parameters) = (quadric, QUADRIC);
             }
         }
         Some(())
     }
 
-    fn describe(
-        &mut self,
-        spots: &[Spot],
-        locals: &[Local],
-        weights: &[f64],
-        residuals: &[f64],
-        normal: f64,
-    ) {
-        let (mut sum, mut squares, mut weighted, mut variances) = (0.0, 0.0, 0.0, 0.0);
+    fn describe(&mut self, spots: &Spots, locals: &[Local], normal: f64) {
+        let mut sums = [f32x8::ZERO; 6];
         let mut passes = [(0.0, 0.0); N_PASSES];
-        for (i, l) in locals.iter().enumerate() {
-            let across = l.beam[2].abs().max(GRAZING) * l.sigma;
-            let (r, v) = (residuals[i], across * across);
-            self.cost += l.weight * (r * r).min(REJECTED * REJECTED);
-            self.weight += l.weight;
-            let share = weights[i] * v;
-            sum += share;
-            squares += share * share;
-            weighted += share * r * r;
-            variances += share * v;
-            let (of_pass, of_residuals) = &mut passes[usize::from(spots[i].pass) % N_PASSES];
-            *of_pass += share;
-            *of_residuals += share * r * v.sqrt();
+        for (l, block) in locals.iter().zip(spots.blocks()) {
+            let squared = l.residual * l.residual;
+            let share = l.weight * l.variance;
+            let terms = [
+                l.share * squared.fast_min(f32x8::splat(REJECTED * REJECTED)),
+                l.share,
+                share,
+                share * share,
+                share * squared,
+                share * l.variance,
+            ];
+            add(&mut sums, terms);
+            let off = share * l.residual * l.variance.sqrt();
+            for (pass, (share, off)) in block
+                .pass
+                .iter()
+                .zip(share.to_array().iter().zip(off.to_array()))
+            {
+                let (of_pass, of_residuals) = &mut passes[usize::from(*pass) % N_PASSES];
+                *of_pass += f64::from(*share);
+                *of_residuals += f64::from(off);
+            }
         }
+        let [cost, weight, sum, squares, weighted, variances] = sums.map(total);
+        (self.cost, self.weight) = (cost, weight.max(f64::MIN_POSITIVE));
         if sum <= 0.0 {
             return;
         }
@@ -254,32 +265,36 @@ impl Sheet {
         self.cost / self.weight
     }
 
-    /// Residual over its standard deviation.
-    fn normalized(&self, l: &Local) -> f64 {
-        let h = &self.heights;
-        let height =
-            l.height - (h[0] + l.u * (h[1] + h[3] * l.u + h[4] * l.v) + l.v * (h[2] + h[5] * l.v));
-        let du = (h[1] + 2.0 * h[3] * l.u + h[4] * l.v) / self.radius;
-        let dv = (h[2] + h[4] * l.u + 2.0 * h[5] * l.v) / self.radius;
-        let norm = (1.0 + du * du + dv * dv).sqrt();
-        let cosine = (l.beam[2] - du * l.beam[0] - dv * l.beam[1]).abs() / norm;
-        height / (norm * cosine.max(GRAZING) * l.sigma)
+    /// Finds the residuals over their standard deviations, and the largest one.
+    fn normalize(&self, locals: &mut [Local]) -> f32 {
+        let h: [f32x8; QUADRIC] = std::array::from_fn(|k| f32x8::splat(self.heights[k] as f32));
+        let per_metre = 1.0 / self.radius as f32;
+        let mut largest = f32x8::ZERO;
+        for l in locals {
+            let (u, v) = (l.u, l.v);
+            let (bend_u, bend_v, twist) = (h[3] * u, h[5] * v, h[4] * v);
+            let height = l.height - (h[0] + u * (h[1] + bend_u + twist) + v * (h[2] + bend_v));
+            let du = (h[1] + bend_u + bend_u + twist) * per_metre;
+            let dv = (h[2] + h[4] * u + bend_v + bend_v) * per_metre;
+            let norm = (1.0 + du * du + dv * dv).sqrt();
+            let along = (l.beam[2] - du * l.beam[0] - dv * l.beam[1]).abs();
+            l.residual = height / (along.fast_max(GRAZING * norm) * l.sigma);
+            largest = largest.fast_max(l.residual.abs() * l.is);
+        }
+        largest.to_array().into_iter().fold(0.0, f32::max)
     }
 
-    /// As a cost: squared, at most that of a residual that counts no more.
-    pub(crate) fn cost_of(&self, s: &Spot) -> f64 {
-        let (at, beam) = (self.axes * s.at, self.axes * s.beam);
-        let local = Local {
-            u: at[0] / self.radius,
-            v: at[1] / self.radius,
-            height: at[2],
-            beam,
-            sigma: s.sigma,
-            weight: 1.0,
-            inverse: 1.0,
-        };
-        let r = self.normalized(&local);
-        (r * r).min(REJECTED * REJECTED)
+    /// What each spot costs: its residual squared, at most that of one that counts no more.
+    pub(crate) fn costs(&self, spots: &Spots) -> Vec<f32> {
+        let mut locals = self.locals(spots);
+        self.normalize(&mut locals);
+        let cost = |r: f32| (r * r).min(REJECTED * REJECTED);
+        let mut costs: Vec<f32> = locals
+            .iter()
+            .flat_map(|l| l.residual.to_array().map(cost))
+            .collect();
+        costs.truncate(spots.len());
+        costs
     }
 
     /// Height of the middle over the plane that touches the sheet beside it, m.
@@ -288,16 +303,19 @@ impl Sheet {
     }
 }
 
-/// Tukey's weights by the residuals.
-fn reweight(locals: &[Local], residuals: &[f64], weights: &mut [f64]) {
-    let mut sizes: Vec<f64> = residuals.iter().map(|r| r.abs()).collect();
-    let half = sizes.len() / 2;
-    let median = *sizes.select_nth_unstable_by(half, f64::total_cmp).1;
-    let scale = (MAD_TO_STD * median).max(1.0);
-    for ((w, l), r) in weights.iter_mut().zip(locals).zip(residuals) {
-        let x = r / (REJECTED * scale);
-        let share = (1.0 - x * x).max(0.0);
-        *w = l.inverse * share * share;
+/// Tukey's weights by the residuals of the first `n` spots.
+fn reweight(locals: &mut [Local], n: usize) {
+    let mut sizes: Vec<f32> = locals
+        .iter()
+        .flat_map(|l| l.residual.abs().to_array())
+        .collect();
+    sizes.truncate(n);
+    let median = *sizes.select_nth_unstable_by(n / 2, f32::total_cmp).1;
+    let per_scale = 1.0 / (REJECTED * (MAD_TO_STD * median).max(1.0));
+    for l in locals {
+        let x = l.residual * per_scale;
+        let kept = (1.0 - x * x).fast_max(f32x8::ZERO);
+        l.weight = l.share / l.variance * kept * kept;
     }
 }
 
@@ -305,25 +323,6 @@ fn reweight(locals: &[Local], residuals: &[f64], weights: &mut [f64]) {
 fn frame(normal: &Vector3<f64>) -> Matrix3<f64> {
     let [u, v] = so3::orthogonal_pair(normal);
     Matrix3::from_rows(&[u.transpose(), v.transpose(), normal.transpose()])
-}
-
-/// The normal of a plane through spots, in whose direction they spread least; it faces the lidar.
-pub(crate) fn normal_of(spots: &[Spot]) -> Option<Vector3<f64>> {
-    let mut sums = Moments::default();
-    let mut beams = Vector3::zeros();
-    for s in spots {
-        sums.add_point(s.at.into());
-        beams += s.beam;
-    }
-    if sums.n() == 0 {
-        return None;
-    }
-    let normal = sums.eigen().normal;
-    Some(if beams.dot(&normal) > 0.0 {
-        -normal
-    } else {
-        normal
-    })
 }
 
 /// Where the product of two of the terms 1, u, v, u², uv, v² is among the sums.
@@ -346,42 +345,30 @@ struct Sums {
 }
 
 impl Sums {
-    fn of(locals: &[Local], weights: &[f64]) -> Self {
-        let (mut a, mut b, mut squares, mut n) = ([0.0; 15], [0.0; 6], 0.0, 0.0);
-        for (l, &w) in locals.iter().zip(weights) {
-            let (p, q, h) = (l.u, l.v, l.height);
-            let (pp, pq, qq) = (p * p, p * q, q * q);
-            let terms = [
-                1.0,
-                p,
-                q,
-                pp,
-                pq,
-                qq,
-                pp * p,
-                pp * q,
-                p * qq,
-                qq * q,
-                pp * pp,
-                pp * pq,
-                pp * qq,
-                pq * qq,
-                qq * qq,
-            ];
-            for (sum, t) in a.iter_mut().zip(terms) {
-                *sum += w * t;
-            }
+    fn of(locals: &[Local]) -> Self {
+        let (mut a, mut b) = ([f32x8::ZERO; 15], [f32x8::ZERO; 6]);
+        let mut others = [f32x8::ZERO; 2];
+        for l in locals {
+            let (p, q, h, w) = (l.u, l.v, l.height, l.weight);
+            let (wp, wq, pp, qq) = (w * p, w * q, p * p, q * q);
+            let (wpp, wpq, wqq) = (wp * p, wp * q, wq * q);
+            let cubes = [wpp * p, wpp * q, wpq * q, wqq * q];
+            let fourths = [wpp * pp, wpq * pp, wpp * qq, wpq * qq, wqq * qq];
+            let [c0, c1, c2, c3] = cubes;
+            let [f0, f1, f2, f3, f4] = fourths;
+            add(
+                &mut a,
+                [w, wp, wq, wpp, wpq, wqq, c0, c1, c2, c3, f0, f1, f2, f3, f4],
+            );
             let wh = w * h;
-            for (sum, t) in b.iter_mut().zip(terms) {
-                *sum += wh * t;
-            }
-            squares += wh * h;
-            n += l.weight;
+            add(&mut b, [wh, wp * h, wq * h, wpp * h, wpq * h, wqq * h]);
+            add(&mut others, [wh * h, l.share]);
         }
+        let (a, [squares, n]) = (a.map(total), others.map(total));
         Self {
             n,
             matrix: Matrix6::from_fn(|i, j| a[PLACES[i][j]]),
-            right: Vector6::from(b),
+            right: Vector6::from(b.map(total)),
             squares,
         }
     }

@@ -10,8 +10,9 @@ use crate::grid::{Level, N_AROUND, NONE, beside};
 use crate::noise::Noise;
 use crate::piece::Piece;
 use crate::sample::Sorted;
-use crate::sheet::{Sheet, Spot, normal_of};
+use crate::sheet::Sheet;
 use crate::split::{Half, split};
+use crate::spots::{Spot, Spots, dot};
 
 /// Points around a middle are used up to so many edges away, with less and less weight.
 const REACH: f64 = 1.5;
@@ -23,7 +24,7 @@ const FEWEST_SPOTS: usize = 8;
 const NOISE_EVERY: usize = 8;
 const MOST_CELLS: usize = 8192;
 /// The noise is read where beams meet a sheet at more than this cosine, m.
-const NOISE_COSINE: f64 = 0.5;
+const NOISE_COSINE: f32 = 0.5;
 /// Cells per parallel task; fixed, so that results do not depend on the number of threads.
 const CHUNK: usize = 64;
 /// Residuals beyond this many standard deviations of what noise alone would make show a second sheet.
@@ -94,7 +95,7 @@ pub(crate) fn layers_of(sorted: &Sorted, noise: &Noise) -> Vec<Layer> {
             .collect();
         let found: Vec<Vec<Found>> = cells
             .par_chunks(CHUNK)
-            .map_init(Vec::new, |spots, places| {
+            .map_init(Spots::default, |spots, places| {
                 let mut around = level.around(places[0]);
                 let of_cell = |&place: &usize| {
                     let (number, around) = (level.in_rows(place), around.of(place));
@@ -150,7 +151,7 @@ pub(crate) fn noise_of(sorted: &Sorted) -> Option<Noise> {
         let of_level: Vec<Option<(u8, f64)>> = places
             .par_iter()
             .with_min_len(CHUNK)
-            .map_init(Vec::new, |spots, &place| {
+            .map_init(Spots::default, |spots, &place| {
                 residual(sorted, level, place, spots)
             })
             .collect();
@@ -160,21 +161,17 @@ pub(crate) fn noise_of(sorted: &Sorted) -> Option<Noise> {
 }
 
 /// Step of the range of a cell's points and the standard deviation of their residuals along the beams.
-fn residual(
-    sorted: &Sorted,
-    level: &Level,
-    place: usize,
-    spots: &mut Vec<Spot>,
-) -> Option<(u8, f64)> {
+fn residual(sorted: &Sorted, level: &Level, place: usize, spots: &mut Spots) -> Option<(u8, f64)> {
     let cell = level.in_rows(place);
     let around = level.around(place).of(place);
     let (_, radius) = gather(sorted, level, cell, &around, None, spots)?;
-    let normal = normal_of(spots)?;
-    spots.retain(|s| s.beam.dot(&normal) < -NOISE_COSINE);
-    if spots.len() < sorted.settings.enough / 2 {
+    let normal = spots.normal()?;
+    let row = single(&normal);
+    let [steep, _] = spots.partition(|s| dot(&row, &s.beam) < -NOISE_COSINE);
+    if steep.len() < sorted.settings.enough / 2 {
         return None;
     }
-    let sheet = Sheet::fit(spots, radius, &normal)?;
+    let sheet = Sheet::fit(&steep, radius, &normal)?;
     let own = level.points(cell);
     let step = sorted.shots[own.start + own.len() / 2].step;
     (sheet.n_passes >= sorted.settings.fewest_passes).then_some((step, sheet.scale.sqrt() * UNIT))
@@ -190,7 +187,7 @@ fn gather(
     cell: u32,
     around: &[u32; N_AROUND],
     noise: Option<&Noise>,
-    spots: &mut Vec<Spot>,
+    spots: &mut Spots,
 ) -> Option<(Vector3<f64>, f64)> {
     let around = around.iter().filter(|&&c| c != NONE);
     let total: usize = around.clone().map(|&c| level.points(c).len()).sum();
@@ -198,21 +195,27 @@ fn gather(
         return None;
     }
     let own = level.points(cell);
+    let n_own = own.len() as f64;
     let place = |i: usize| Vector3::from(sorted.shots[i].at.map(f64::from));
-    let middle = own.clone().fold(Vector3::zeros(), |sum, i| sum + place(i)) / own.len() as f64;
-    let radius = REACH * level.edge;
+    let middle = own.fold(Vector3::zeros(), |sum, i| sum + place(i)) / n_own;
+    let (from, radius) = (single(&middle), REACH * level.edge);
+    let most = (radius * radius) as f32;
     spots.clear();
     let every = total.div_ceil(MOST_SPOTS);
     let mut skipped = 0;
     for &cell in around {
         let points = level.points(cell);
-        for i in (points.start + skipped..points.end).step_by(every) {
-            let (shot, at) = (&sorted.shots[i], place(i) - middle);
-            if at.norm_squared() < radius * radius {
-                spots.push(Spot {
+        for shot in sorted.shots[points.clone()]
+            .iter()
+            .skip(skipped)
+            .step_by(every)
+        {
+            let at = [0, 1, 2].map(|a| shot.at[a] - from[a]);
+            if dot(&at, &at) < most {
+                spots.push(&Spot {
                     at,
-                    beam: Vector3::from(shot.beam.map(f64::from)),
-                    sigma: noise.map_or(UNIT, |n| n.of_step(shot.step)),
+                    beam: shot.beam,
+                    sigma: noise.map_or(UNIT, |n| n.of_step(shot.step)) as f32,
                     pass: shot.pass,
                 });
             }
@@ -229,20 +232,20 @@ fn pieces_of(
     cell: u32,
     around: &[u32; N_AROUND],
     noise: &Noise,
-    spots: &mut Vec<Spot>,
+    spots: &mut Spots,
 ) -> Vec<Piece> {
     let Some((middle, radius)) = gather(sorted, level, cell, around, Some(noise), spots) else {
         return Vec::new();
     };
-    let Some(normal) = normal_of(spots) else {
+    let Some(normal) = spots.normal() else {
         return Vec::new();
     };
     // Those that beams meet from behind are of another side.
-    spots.sort_by_key(|s| s.beam.dot(&normal) > 0.0);
-    let n_front = spots.partition_point(|s| s.beam.dot(&normal) <= 0.0);
-    let (front, back) = spots.split_at(n_front);
+    let row = single(&normal);
+    let is_front = |s: &Spot| dot(&row, &s.beam) <= 0.0;
+    let sides = spots.partition(is_front);
     let mut pieces = Vec::new();
-    for side in [front, back] {
+    for side in &sides {
         if side.len() < FEWEST_SPOTS {
             continue;
         }
@@ -258,8 +261,8 @@ fn pieces_of(
 }
 
 /// One sheet, or two where that is more likely.
-fn sheets_of(spots: &[Spot], radius: f64) -> Vec<(Sheet, Option<Half>)> {
-    let Some(normal) = normal_of(spots) else {
+fn sheets_of(spots: &Spots, radius: f64) -> Vec<(Sheet, Option<Half>)> {
+    let Some(normal) = spots.normal() else {
         return Vec::new();
     };
     let one = Sheet::fit(spots, radius, &normal);
@@ -268,7 +271,12 @@ fn sheets_of(spots: &[Spot], radius: f64) -> Vec<(Sheet, Option<Half>)> {
     {
         return pair.map(|(sheet, half)| (sheet, Some(half))).to_vec();
     }
+    let one = one.map(|sheet| sheet.narrower(spots).unwrap_or(sheet));
     one.map(|sheet| (sheet, None)).into_iter().collect()
+}
+
+fn single(v: &Vector3<f64>) -> [f32; 3] {
+    [v.x as f32, v.y as f32, v.z as f32]
 }
 
 fn is_suspicious(sheet: &Sheet) -> bool {

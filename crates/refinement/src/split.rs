@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 use wide::f32x4;
 
 use crate::sheet::{GRAZING, Sheet};
-use crate::spots::{Spot, Spots, dot};
+use crate::spots::{Spot, Spots, dot, single};
 
 const N_DIRECTIONS: usize = 6;
 const N_BINS: usize = 10;
@@ -152,10 +152,6 @@ fn end_of<const N: usize>(bin: usize) -> f64 {
 
 fn middle_of(bin: usize) -> f32 {
     (2 * bin + 1) as f32 / N_BINS as f32 - 1.0
-}
-
-fn single(v: &Vector3<f64>) -> [f32; 3] {
-    [v.x as f32, v.y as f32, v.z as f32]
 }
 
 /// The line of a step between two sheets, which leaves each spot on the one that it fits.

@@ -153,3 +153,8 @@ pub(crate) fn add<const N: usize>(sums: &mut [f32x8; N], terms: [f32x8; N]) {
 pub(crate) fn dot(a: &[f32; 3], b: &[f32; 3]) -> f32 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
+
+#[inline]
+pub(crate) fn single(v: &Vector3<f64>) -> [f32; 3] {
+    [v.x as f32, v.y as f32, v.z as f32]
+}

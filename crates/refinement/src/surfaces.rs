@@ -12,7 +12,7 @@ use crate::piece::Piece;
 use crate::sample::Sorted;
 use crate::sheet::Sheet;
 use crate::split::{Half, split};
-use crate::spots::{Spot, Spots, dot};
+use crate::spots::{Spot, Spots, dot, single};
 
 /// Points around a middle are used up to so many edges away, with less and less weight.
 const REACH: f64 = 1.5;
@@ -273,10 +273,6 @@ fn sheets_of(spots: &Spots, radius: f64) -> Vec<(Sheet, Option<Half>)> {
     }
     let one = one.map(|sheet| sheet.narrower(spots).unwrap_or(sheet));
     one.map(|sheet| (sheet, None)).into_iter().collect()
-}
-
-fn single(v: &Vector3<f64>) -> [f32; 3] {
-    [v.x as f32, v.y as f32, v.z as f32]
 }
 
 fn is_suspicious(sheet: &Sheet) -> bool {

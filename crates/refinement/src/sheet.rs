@@ -24,7 +24,7 @@ const STEEP: f64 = 0.1;
 /// Slope at the edge from which on a surface bends otherwise than a quadric: a cylinder of which more is
 /// taken looks too thin. Then less is taken, but not less than this share of the radius.
 const STEEPEST: f64 = 0.8;
-const NARROWEST: f64 = 0.5;
+const NARROWEST: f64 = 0.75;
 const PLANE: usize = 3;
 const QUADRIC: usize = 6;
 /// A surface cannot be told from another one that a beam meets at less than this cosine.

@@ -14,8 +14,13 @@ pub fn prior() -> GlobalPrior {
         information: GlobalMatrix::from_diagonal_element(1e5),
         offset: [0.0; N_GLOBALS],
         frozen: std::array::from_fn(|g| {
-            g == index::LATENCY_RATE
-                || (index::ENCODER_ZERO..index::HEAD.end).contains(&g)
+            index::MOTOR.contains(&g)
+                || [
+                    index::LATENCY_RATE,
+                    index::RANGE_OFFSET,
+                    index::RANGE_GRAZING,
+                ]
+                .contains(&g)
                 || g >= index::GYRO_SCALE.start
         }),
     }

@@ -270,9 +270,20 @@ def simulated(made_once):
     """Return a maker of simulated recordings: the folder with recording, payload and truth."""
 
     @functools.cache
-    def make(scene, duration, *, seed=0, flight_seed=None, head="hokuyo-spin", events=()):
+    def make(
+        scene,
+        duration,
+        *,
+        seed=0,
+        flight_seed=None,
+        head="hokuyo-spin",
+        events=(),
+        realism=0.0,
+        only=(),
+    ):
         flight = [] if flight_seed is None else [f"flight{flight_seed}"]
-        name = "-".join(["sim", scene, head, f"{duration:g}", str(seed), *flight, *events])
+        harsh = [f"realism{realism:g}", *only] if realism else []
+        name = "-".join(["sim", scene, head, f"{duration:g}", str(seed), *flight, *events, *harsh])
         scenario = Scenario(
             scene=scene,
             head=head,
@@ -280,6 +291,8 @@ def simulated(made_once):
             seed=seed,
             flight_seed=flight_seed,
             events=events,
+            realism=realism,
+            realism_only=only,
         )
         return made_once(name, lambda folder: simulate(scenario, folder))
 

@@ -123,9 +123,7 @@ def test_a_minute_in_flight_with_a_multi_beam_scanner(flown, scene, head, seed):
 @pytest.mark.slow
 def test_a_motor_turns_otherwise_than_its_encoder_reads(flown):
     """With 0.17° of eccentricity and a shaft that wobbles by 0.1° it is as exact as without."""
-    flight = flown(
-        "courtyard", 40.0, seed=171, head="vlp16-motor", realism=3.0, realism_only=("motor",)
-    )
+    flight = flown("courtyard", 40.0, seed=171, head="vlp16-motor", realism=3.0, only=("motor",))
     drawn = yaml.safe_load((flight.recording / "truth_realism.yaml").read_text())["motor"][
         "encoder"
     ]

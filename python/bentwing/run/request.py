@@ -36,14 +36,10 @@ def request_of(settings: RunSettings, inputs: Iterable[Mapping[str, Any]]) -> st
     settings : before a head was found in the recording
     inputs : name, size and hash of each file, as run.json has them
     """
-    marks = settings.georeferencing.control_points
-    return digest_of(
-        {
-            "settings": deciding(settings),
-            "inputs": list(inputs),
-            "control_points": None if marks is None else describe_input(marks),
-        }
-    )
+    on_earth = settings.georeferencing
+    read = {"control_points": on_earth.control_points, "fixes": on_earth.fixes}
+    files = {name: None if path is None else describe_input(path) for name, path in read.items()}
+    return digest_of({"settings": deciding(settings), "inputs": list(inputs), **files})
 
 
 def digest_of(asked: Mapping[str, Any]) -> str:

@@ -10,7 +10,7 @@ import pytest
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
-from bentwing import export
+from bentwing import ExportOptions, export
 from bentwing.base import geometry
 from bentwing.base.covariances import PoseCovariances
 from bentwing.base.errors import UsageError
@@ -59,7 +59,7 @@ def read(path, *, in_order=True):
 @pytest.fixture(scope="module")
 def exported(run, tmp_path_factory):
     path = tmp_path_factory.mktemp("mcap") / "run.mcap"
-    done = export(run, path, spacing=0.0)
+    done = export(run, path, ExportOptions(spacing=0.0))
     return done, *read(path)
 
 
@@ -162,7 +162,8 @@ def test_the_map_grows_by_clouds_of_a_second_in_the_frame_of_the_path(exported, 
 
 
 def test_crops_and_spacing_act_on_the_points(run, points, tmp_path):
-    done = export(run, tmp_path / "a.mcap", crop=Crop(times=(5.0, 7.5)), spacing=1.0)
+    options = ExportOptions(crop=Crop(times=(5.0, 7.5)), spacing=1.0)
+    done = export(run, tmp_path / "a.mcap", options)
     found, _ = read(tmp_path / "a.mcap")
     times = np.linspace(0.0, 19.9, N)
     kept = points[(times >= 5.0) & (times <= 7.5)]
@@ -186,12 +187,10 @@ def test_covariances_that_are_not_known_are_zeros(points, tmp_path):
 def test_runs_of_a_merged_map_have_frames_and_topics_of_their_own(run, points, tmp_path):
     alone = Finished.open(run)
     late_ns = START_NS + 3 * 10**9
-    merged = replace(
-        alone,
-        trajectories={"first day": flight(), "second": flight()},
-        start_ns={"first day": START_NS, "second": late_ns},
-        covariances={"first day": None, "second": None},
-    )
+    (one,) = alone.flights
+    flights = (replace(one, name="first day"), replace(one, name="second", start_ns=late_ns))
+    record = {**alone.run.record, "runs": [{"name": each.name} for each in flights]}
+    merged = replace(alone, run=replace(alone.run, record=record, flights=flights), flights=flights)
     times = np.linspace(0.0, 19.9, N)
     ranges = np.ones(N, np.float32)
     chunks = [MapChunk(points, times, ranges), MapChunk(points, times + 3.0, ranges)]
@@ -208,14 +207,18 @@ def test_runs_of_a_merged_map_have_frames_and_topics_of_their_own(run, points, t
     assert cloud_points(found["/map_points"][0][1])[0] == ["x", "y", "z"]
 
 
-@pytest.mark.parametrize("wish", [{"epsg": 32632}, {"tiles": 10}])
-def test_messages_have_one_frame_and_one_file(run, tmp_path, wish):
+@pytest.mark.parametrize("options", [{"options": ExportOptions(epsg=32632)}, {"tiles": 10}])
+def test_messages_have_one_frame_and_one_file(run, tmp_path, options):
     with pytest.raises(UsageError, match="in the frame of the trajectory and in one file"):
-        export(run, tmp_path / "a.mcap", **wish)
+        export(run, tmp_path / "a.mcap", **options)
     assert not list(tmp_path.iterdir())
 
 
 def test_a_crop_that_leaves_nothing_leaves_no_file(run, tmp_path):
     with pytest.raises(UsageError, match=r"no point of the map is left|nothing of the map"):
-        export(run, tmp_path / "a.mcap", crop=Crop(box=(-1, -1, 5.9, -0.99, -0.99, 5.91)))
+        export(
+            run,
+            tmp_path / "a.mcap",
+            ExportOptions(crop=Crop(box=(-1, -1, 5.9, -0.99, -0.99, 5.91))),
+        )
     assert not list(tmp_path.iterdir())

@@ -103,7 +103,7 @@ def test_unknown_keys_are_refused_with_the_nearest_name(tmp_path, text, message)
         ("lidar: {min_range: 5, max_range: 2}", ["lidar", "min_range 5 m"]),
         ("lidar: {kind: hokujo}", ["lidar.kind", "hokujo", "hokuyo-utm30lx"]),
         ("lidar: {range_sigma: -1}", ["lidar.range_sigma", "-1"]),
-        ("gnss: {}", ["gnss.topic", "required"]),
+        ("gnss: {}", ["gnss", "topic", "lever_arm"]),
         ("- 1\n- 2", ["expected a mapping", "list"]),
         ("lidar: {", ["not valid YAML"]),
         ("", ["expected a mapping"]),

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from pydantic import field_validator
+from pydantic import field_validator, model_validator
 
 from bentwing.recording.sections.section import Lever, Section, Topic, Vector, require_lever
 
@@ -24,3 +24,10 @@ class Gnss(Section):
     @classmethod
     def _plausible_lever(cls, value: Vector) -> Vector:
         return require_lever(value)
+
+    @model_validator(mode="after")
+    def _says_something(self) -> Gnss:
+        if not self.model_fields_set:
+            msg = "says nothing; give the topic of the fixes, or the lever_arm for fixes in a file"
+            raise ValueError(msg)
+        return self

@@ -24,6 +24,8 @@ ROWS = {
     "extrinsic_rotation": ("lidar or motor on the IMU, angles", "°", 180 / np.pi),
     "extrinsic_translation": ("lidar or motor on the IMU, shifts", "mm", 1e3),
     "encoder_zero": ("zero of the encoder", "°", 180 / np.pi),
+    "encoder_eccentricity": ("eccentricity of the encoder", "°", 180 / np.pi),
+    "motor_wobble": ("wobble of the motor's shaft", "°", 180 / np.pi),
 }
 
 

@@ -134,9 +134,10 @@ def _run(order: str, name: str, processes: Processes | None) -> tuple[int, str]:
         if processes is not None:
             processes.add(process)
         try:
+            assert process.stdin is not None  # it is a pipe
             with suppress(BrokenPipeError):
-                process.stdin.write(order + "\n")  # type: ignore[union-attr] # it is a pipe
-                process.stdin.flush()  # type: ignore[union-attr]
+                process.stdin.write(order + "\n")
+                process.stdin.flush()
             last: deque[str] = deque(maxlen=1)
             for line in process.stderr or ():
                 if line.strip():

@@ -28,6 +28,7 @@ _WEEK = 7 * 86_400
 _QUALITIES: dict[int, FixQuality] = {
     1: "fixed", 2: "float", 3: "differential", 4: "differential", 5: "single", 6: "ppp",
 }  # fmt: skip
+_SCALES: dict[str, TimeScale] = {"GPST": "gps", "UTC": "utc"}
 _NEEDED = 5  # latitude, longitude, height, quality and satellites
 _STATED = 6  # sdn, sde, sdu, sdne, sdeu, sdun
 
@@ -90,7 +91,7 @@ def _of_header(path: Path, line: str, scale: TimeScale | None) -> TimeScale | No
     if "latitude" not in line or scale is not None:
         return scale
     name = line[1:].split()[0].rstrip(",").upper()
-    return {"GPST": "gps", "UTC": "utc"}.get(name)  # type: ignore[return-value]
+    return _SCALES.get(name)
 
 
 def _fix(words: list[str], scale: TimeScale) -> FileFix | None:

@@ -10,7 +10,9 @@ import pytest
 import yaml
 
 from bentwing.base import geometry
+from bentwing.cli.calibrate_page import ROWS
 from bentwing.recording import Payload
+from bentwing.recording.sections.calibration import STD_UNITS
 from bentwing.simulate import Scenario, simulate
 
 
@@ -98,3 +100,7 @@ def test_motion_tells_the_mount_of_the_imu_and_the_latency(bentwing, made_once, 
     )
     assert (np.abs(shift[:2]) < 4 * np.array(std["extrinsic_translation"][:2])).all()
     assert np.abs(tilts(found.encoder.T_motor_lidar, truth)).max() < 0.05
+
+
+def test_the_page_has_a_row_for_everything_that_has_a_deviation():
+    assert ROWS.keys() == STD_UNITS.keys()

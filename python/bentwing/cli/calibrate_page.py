@@ -26,6 +26,8 @@ ROWS = {
     "encoder_zero": ("zero of the encoder", "°", 180 / np.pi),
     "encoder_eccentricity": ("eccentricity of the encoder", "°", 180 / np.pi),
     "motor_wobble": ("wobble of the motor's shaft", "°", 180 / np.pi),
+    "range_offset": ("ranges too long", "mm", 1e3),
+    "range_grazing": ("ranges too long under 45°", "mm per m", 1e3),
 }
 
 

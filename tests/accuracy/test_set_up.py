@@ -12,6 +12,7 @@ import pytest
 from bentwing.base import geometry
 from bentwing.calibrate.draft import draft_payload
 from bentwing.calibrate.set_up import find_set_up
+from bentwing.calibrate.set_up.axes import angle_between
 from bentwing.evaluate.simulated import score
 from bentwing.recording import Payload
 from bentwing.run.pipeline import map_recording
@@ -68,6 +69,18 @@ def test_the_search_goes_on_behind_a_set_up_that_fits_for_some_seconds_only(simu
     found = find_set_up([recording], Payload.load(payload))
     assert found.doubt is None
     assert {finding.kind for finding in found.findings} == {"mount"}
+
+
+@pytest.mark.slow
+def test_a_head_that_spins_evenly_above_level_ground_needs_no_payload(simulated):
+    """Its scans come back alike after each turn, and whole families of mounts agree at their crossings."""
+    folder = simulated("courtyard", 75.0, seed=131)
+    paths = [folder / "recording.bag"]
+    found = find_set_up(paths, draft_payload(paths).payload)
+    assert found.doubt is None
+    assert found.payload.lidar.latency == pytest.approx(0.003, abs=0.005)
+    true = Payload.load(folder / "payload.yaml").T_imu_lidar
+    assert angle_between(found.payload.T_imu_lidar.pose.R, true.pose.R) < np.radians(3.0)
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from bentwing.calibrate.set_up.crossings import Crossings, Reading
+from bentwing.calibrate.set_up.delays import likely_delays
 from bentwing.calibrate.set_up.rotations import spread
 from bentwing.calibrate.set_up.scans import Scans
 from bentwing.recording.batches import ImuBatch, LidarBatch
@@ -36,14 +37,27 @@ def sphere(directions: np.ndarray) -> np.ndarray:
     return np.full(len(directions), 4.0)
 
 
-def flight(surroundings) -> tuple[Scans, ImuBatch]:
+def nodded(t: np.ndarray) -> Rotation:
+    """A head that nods, ever faster, on a carrier that hardly turns."""
+    nod = 0.8 * np.sin(5 * t + 0.05 * t**2)
+    return Rotation.from_euler("zyx", np.column_stack([0.02 * t, nod, 0.1 * np.sin(t)]))
+
+
+def spun(t: np.ndarray) -> Rotation:
+    """A head that spins evenly about the vertical and hardly tilts."""
+    return Rotation.from_euler(
+        "zyx", np.column_stack([4.0 * t, 0.02 * np.sin(0.7 * t), 0.02 * np.cos(0.9 * t)])
+    )
+
+
+def flight(surroundings, attitude=attitude, length=LENGTH) -> tuple[Scans, ImuBatch]:
     """Scans of a head that turns on the spot, and its inertial samples."""
-    times = np.arange(0, LENGTH, SCAN / N_BEAMS)
+    times = np.arange(0, length, SCAN / N_BEAMS)
     azimuths = np.tile(np.linspace(-2.3, 2.3, N_BEAMS), len(times) // N_BEAMS)
     times = times[: len(azimuths)]
     beams = np.column_stack([np.cos(azimuths), np.sin(azimuths), np.zeros(len(azimuths))])
     points = surroundings(attitude(times).apply(beams @ MOUNT.T))[:, None] * beams
-    at, step = np.arange(0, LENGTH, 0.005), 1e-4
+    at, step = np.arange(0, length, 0.005), 1e-4
     turns = attitude(at - step).inv() * attitude(at + step)
     gyro = turns.as_rotvec() / (2 * step)
     return Scans(LidarBatch(points, times)), ImuBatch(at, gyro, np.zeros_like(gyro))
@@ -81,6 +95,23 @@ def test_a_delay_shows(in_a_room, delay):
     scans, imu = in_a_room
     crossings = Crossings(scans, ImuBatch(imu.times - delay, imu.gyro, imu.accel))
     assert crossings.misfit(MOUNT, Reading(delay)) < 0.4 * crossings.misfit(MOUNT, Reading())
+
+
+def test_a_delay_that_shows_is_the_likeliest():
+    scans, imu = flight(room, nodded, length=12.0)
+    late = ImuBatch(imu.times + 0.8, imu.gyro, imu.accel)
+    found = likely_delays(scans, late, Crossings(scans, late))
+    assert found[0] == pytest.approx(-0.8, abs=0.03)
+    assert found[1] == pytest.approx(0.0, abs=0.15)
+
+
+def test_of_a_head_that_spins_evenly_the_clocks_are_believed_and_all_mounts_are_covered():
+    scans, imu = flight(room, spun)
+    crossings = Crossings(scans, imu)
+    assert likely_delays(scans, imu, crossings)[0] == pytest.approx(0.0, abs=0.06)
+    # A trial corrects a mount by 20°.
+    mounts = [R for _, R in crossings.mounts(Reading())]
+    assert min(min(angle(R, MOUNT), angle(R, MOUNT @ HALF_TURN)) for R in mounts) < 20.0
 
 
 def test_no_mount_is_better_than_another_where_all_looks_alike():

@@ -29,7 +29,8 @@ PAIRS, LONGEST = 2000, 0.6  # of scans that are compared, and s between them
 ACROSS = np.sin(np.radians(10.0))  # planes that cross at a smaller angle tell nothing
 FEWEST = 200  # crossings; what fewer say is moved towards what is usual
 COARSE, REFINED = 1000, 24  # rotations that are compared, and the best of them
-APART = np.radians(15.0)  # between mounts that are told apart
+APART = np.radians(15.0)  # between mounts that are told apart; a trial corrects one by 20°
+MOST = 64  # mounts that may be worth a trial
 STEPS = np.radians(8.0)  # in which a rotation is refined first
 
 
@@ -65,6 +66,7 @@ class Crossings:
         inside = later < len(scans.times)
         self._first, self._later = first[inside], later[inside]
         self._attitudes = lru_cache(8)(self._attitudes_by)
+        self.mounts = lru_cache(8)(self._mounts)
         self.usual = 0.0
         rates = [self.misfit(R) for R in spread(50)]
         self.usual = float(np.median(rates))
@@ -90,25 +92,28 @@ class Crossings:
             count += int(known.sum())
         return (total + FEWEST * self.usual) / (count + FEWEST)
 
-    def mounts(self, reading: Reading) -> list[tuple[float, NDArray[np.float64]]]:
-        """Return misfits and rotations (3, 3) where the misfit is least around, best first."""
-        refined = self._best(reading, COARSE, REFINED)
+    def _mounts(self, reading: Reading) -> tuple[tuple[float, NDArray[np.float64]], ...]:
+        """Return misfits and rotations (3, 3) that may be the mount, best first.
+
+        Those where the misfit is least around, and some between them: while a head only spins above
+        level ground, all mounts of whole families agree as well.
+        """
+        coarse = self._rated(reading, COARSE)
+        refined = sorted((self._refined(R, reading) for _, R in coarse[:REFINED]), key=_first)
         found: list[tuple[float, NDArray[np.float64]]] = []
-        for misfit, R in refined:
+        for misfit, R in [*refined, *coarse]:
             if all(angle_between(R, other) > APART for _, other in found):
                 found.append((misfit, R))
-        return found
+        return tuple(sorted(found[:MOST], key=_first))
 
     def least(self, reading: Reading) -> float:
         """Return the misfit of the best rotation, at a glance."""
-        return self._best(reading, COARSE // 4, REFINED // 6)[0][0]
+        coarse = self._rated(reading, COARSE // 4)
+        return min(self._refined(R, reading)[0] for _, R in coarse[: REFINED // 6])
 
-    def _best(
-        self, reading: Reading, n: int, n_refined: int
-    ) -> list[tuple[float, NDArray[np.float64]]]:
-        """Return misfits and rotations (3, 3): the best of n, refined, best first."""
-        coarse = sorted(((self.misfit(R, reading), R) for R in spread(n)), key=_first)
-        return sorted((self._refined(R, reading) for _, R in coarse[:n_refined]), key=_first)
+    def _rated(self, reading: Reading, n: int) -> list[tuple[float, NDArray[np.float64]]]:
+        """Return misfits of n rotations (3, 3) that cover all there are, best first."""
+        return sorted(((self.misfit(R, reading), R) for R in spread(n)), key=_first)
 
     def _refined(
         self, R: NDArray[np.float64], reading: Reading

@@ -14,10 +14,10 @@ import numpy as np
 
 from bentwing.calibrate.set_up import axes, edits
 from bentwing.calibrate.set_up.crossings import Crossings, Reading
+from bentwing.calibrate.set_up.delays import likely_delays
 from bentwing.calibrate.set_up.errors import NotFoundError
 from bentwing.calibrate.set_up.mirrors import both_meanings
 from bentwing.calibrate.set_up.noise import ImuNoise
-from bentwing.calibrate.set_up.returns import NEARBY, delays_by_returns
 from bentwing.calibrate.set_up.scans import Scans
 from bentwing.calibrate.set_up.trials import Trials
 from bentwing.recording import imu_units
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 # The axes of the samples hold where others explain how gravity turns hardly better.
 AS_GOOD = 1.3
-LIKELY = 4  # delays that are tried first
+LIKELY, LIKELY_UNMOUNTED = 4, 2  # delays that are tried first, and those without a described mount
 MAY_HOLD = 0.3  # of the way from the best misfit of crossings to what is usual
 # Of the logarithm of a range; where the best mount does no better, the surroundings tell no mount.
 TELLING = 0.02
@@ -66,10 +66,10 @@ def describe_by_trials(
         trials.require_scale_of_ranges(given)
     scans = Scans(stretch.lidar)
     crossings = Crossings(scans, imu)
-    delays = _delays(scans, imu, crossings)
+    delays = likely_delays(scans, imu, crossings)
     # A head that nods in time with itself agrees with other delays as well: only the best is tried.
     likely = edits.with_latency(payload, delays[0])
-    descriptions = _Descriptions(likely, crossings, delays[0], _ranked_axes(imu))
+    descriptions = _Descriptions(payload, crossings, delays[0], _ranked_axes(imu))
     described = None if given is None else edits.described_rotation(payload)
     delayed = [edits.with_latency(payload, d) for d in descriptions.agreeing(described, delays)]
     if described is not None:
@@ -81,7 +81,10 @@ def describe_by_trials(
                 if doubt := both_meanings(gyro, accel, described):
                     raise NotFoundError(doubt)
                 return found
-    others = itertools.chain(descriptions.of_mounts(), delayed[LIKELY:])
+    mounted = itertools.chain(
+        *(descriptions.of_mounts(delay) for delay in delays[:LIKELY_UNMOUNTED])
+    )
+    others = itertools.chain(mounted, delayed[LIKELY:])
     if found := _first(trials.at_a_glance(other) for other in others):
         return found
     trials.require_scale_in_what_was_refused()
@@ -94,23 +97,13 @@ def _first(found: Iterable[Payload | None]) -> Payload | None:
     return next((payload for payload in found if payload is not None), None)
 
 
-def _delays(scans: Scans, imu: ImuBatch, crossings: Crossings) -> list[float]:
-    """Return delays, s, the likeliest first, the one of clocks that agree among them."""
-    seen = delays_by_returns(scans, imu)
-    # A head that nods comes back after a period as well, but then its carrier has turned a little.
-    likely = [(cost * crossings.least(Reading(delay)), delay) for cost, delay in seen[:LIKELY]]
-    delays = [delay for _, delay in [*sorted(likely), *seen[LIKELY:]]]
-    return (
-        delays if any(abs(delay) < NEARBY for delay in delays) else [*delays[:1], 0.0, *delays[1:]]
-    )
-
-
 class _Descriptions:
     """Descriptions that may hold by where the scans cross, the likeliest first.
 
     Parameters
     ----------
-    payload : with the delay, s, of the lidar
+    payload : that says nothing of the delay
+    delay : s, the likeliest
     ranked : axes (3, 3) of the gyro relative to the accelerometer's
 
     Raises
@@ -129,8 +122,7 @@ class _Descriptions:
         self._payload, self._crossings, self._ranked = payload, crossings, ranked
         self._delay = delay
         hand = round(np.linalg.det(ranked[0]))
-        self._mounts = crossings.mounts(Reading(delay, hand))
-        best = self._mounts[0][0]
+        best = crossings.mounts(Reading(delay, hand))[0][0]
         if crossings.usual - best < TELLING:
             raise NotFoundError(_ALIKE)
         self._most = best + MAY_HOLD * (crossings.usual - best)
@@ -151,14 +143,16 @@ class _Descriptions:
             if self._crossings.misfit(hand * gyro.T @ R, reading) <= self._most:
                 yield gyro, accel
 
-    def of_mounts(self) -> Iterator[Payload]:
-        """Yield descriptions with other mounts, and the likeliest axes."""
+    def of_mounts(self, delay: float) -> Iterator[Payload]:
+        """Yield descriptions with other mounts and a delay, s, and the likeliest axes."""
         gyro = self._ranked[0]
         hand = round(np.linalg.det(gyro))
-        described = edits.with_axes(self._payload, gyro, np.eye(3))
-        for misfit, R in self._mounts:
-            if misfit <= self._most:
-                yield edits.with_rotation(described, hand * gyro @ R)
+        delayed = edits.with_latency(self._payload, delay)
+        described = edits.with_axes(delayed, gyro, np.eye(3))
+        for misfit, R in self._crossings.mounts(Reading(delay, hand)):
+            if misfit > self._most:
+                break
+            yield edits.with_rotation(described, hand * gyro @ R)
 
 
 def _ranked_axes(imu: ImuBatch) -> list[NDArray[np.float64]]:

@@ -30,7 +30,7 @@ ACROSS = np.sin(np.radians(10.0))  # planes that cross at a smaller angle tell n
 FEWEST = 200  # crossings; what fewer say is moved towards what is usual
 COARSE, REFINED = 1000, 24  # rotations that are compared, and the best of them
 APART = np.radians(15.0)  # between mounts that are told apart; a trial corrects one by 20°
-MOST = 64  # mounts that may be worth a trial
+MOST = 48  # mounts that may be worth a trial
 STEPS = np.radians(8.0)  # in which a rotation is refined first
 
 
@@ -102,9 +102,11 @@ class Crossings:
         refined = sorted((self._refined(R, reading) for _, R in coarse[:REFINED]), key=_first)
         found: list[tuple[float, NDArray[np.float64]]] = []
         for misfit, R in [*refined, *coarse]:
+            if len(found) == MOST:
+                break
             if all(angle_between(R, other) > APART for _, other in found):
                 found.append((misfit, R))
-        return tuple(sorted(found[:MOST], key=_first))
+        return tuple(sorted(found, key=_first))
 
     def least(self, reading: Reading) -> float:
         """Return the misfit of the best rotation, at a glance."""

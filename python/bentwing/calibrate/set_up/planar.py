@@ -81,9 +81,8 @@ def describe_by_trials(
                 if doubt := both_meanings(gyro, accel, described):
                     raise NotFoundError(doubt)
                 return found
-    mounted = itertools.chain(
-        *(descriptions.of_mounts(delay) for delay in delays[:LIKELY_UNMOUNTED])
-    )
+    unmounted = delays[: LIKELY_UNMOUNTED if given is None else 1]
+    mounted = itertools.chain(*map(descriptions.of_mounts, unmounted))
     others = itertools.chain(mounted, delayed[LIKELY:])
     if found := _first(trials.at_a_glance(other) for other in others):
         return found

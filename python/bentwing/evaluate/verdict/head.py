@@ -39,6 +39,8 @@ _STATES = {
     "encoder_zero": "the encoder's zero",
     "motor_tilt": "the direction of the lidar on the motor",
     "motor_offset": "the place of the lidar on the motor",
+    "encoder_eccentricity": "how far off its axis the encoder's disc is",
+    "motor_wobble": "how much the motor's shaft wobbles",
 }
 # A drift of clocks and the turning of a plane are judged over at least so long, s.
 _SHORTEST = 10.0
@@ -121,6 +123,8 @@ def _offsets(found: Calibration, described: Calibration) -> dict[str, Array]:
         lidar = _of_pose(mount.T_motor_lidar, drawn.T_motor_lidar)
         offsets["motor_tilt"] = lidar["extrinsic_rotation"]
         offsets["motor_offset"] = lidar["extrinsic_translation"]
+        offsets["encoder_eccentricity"] = mount.errors.eccentricity - drawn.errors.eccentricity
+        offsets["motor_wobble"] = (mount.errors.wobble - drawn.errors.wobble).ravel()
     return offsets
 
 

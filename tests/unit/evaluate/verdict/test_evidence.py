@@ -12,7 +12,7 @@ import pytest
 from bentwing.base import geometry
 from bentwing.base.breaks import Break
 from bentwing.base.estimate import Estimate
-from bentwing.base.mount import FixedMount, Pose
+from bentwing.base.mount import FixedMount, MotorErrors, Pose
 from bentwing.base.plain import plain
 from bentwing.base.trajectory import Trajectory
 from bentwing.base.window_record import WindowRecord
@@ -29,6 +29,7 @@ from bentwing.evaluate.verdict import (
     judge_so_far,
     verdict_of,
 )
+from bentwing.evaluate.verdict.head import judge_calibration
 from bentwing.recording import ImuBatch, LidarBatch, Payload
 from bentwing.recording.described import described_calibration
 
@@ -229,6 +230,38 @@ def test_a_mount_far_from_the_payload_is_doubted():
     found = verdict_of(judge_estimate(estimate(calibration=turned), PAYLOAD, watched()))
     assert [reason.kind for reason in found.reasons] == ["calibration"]
     assert "the direction of the lidar" in found.reasons[0].sentence
+
+
+@pytest.mark.parametrize(
+    ("errors", "words"),
+    [
+        (
+            MotorErrors(eccentricity=np.array([0.0, 0.02])),
+            "how far off its axis the encoder's disc is",
+        ),
+        (
+            MotorErrors(wobble=np.array([[0.0, 0.01, 0, 0], [0, 0, 0, 0]])),
+            "the motor's shaft wobbles",
+        ),
+    ],
+)
+def test_a_motor_that_turns_far_from_the_payload_is_doubted(errors, words):
+    identity = {"translation": [0, 0, 0], "quaternion": [0, 0, 0, 1]}
+    payload = Payload.model_validate(
+        {
+            "lidar": {"kind": "vlp16"},
+            "encoder": {"T_imu_motor": identity, "T_motor_lidar": identity},
+        }
+    )
+    described = described_calibration(payload)
+    std = {"encoder_eccentricity": [1e-4] * 2, "motor_wobble": [1e-4] * 8}
+    found = replace(described, std=std, mount=replace(described.mount, errors=errors))
+    (evidence,) = judge_calibration(found, payload)
+    (reason,) = verdict_of([evidence]).reasons
+    assert reason.kind == "calibration"
+    assert words in reason.sentence
+    (evidence,) = judge_calibration(replace(described, std=std), payload)
+    assert verdict_of([evidence]).state == "good"
 
 
 @pytest.mark.parametrize("rate", [-0.01, -5e-4, 5e-4, 0.01])

@@ -14,7 +14,7 @@ import numpy as np
 
 from bentwing.base.trajectory import Trajectory
 from bentwing.base.transform import upright
-from bentwing.simulate.ranging import nodes_around
+from bentwing.simulate.ranging import Airframe, nodes_around
 from bentwing.simulate.scenario import Scenario
 from bentwing.simulate.simulation import prepare
 
@@ -50,7 +50,8 @@ class SimulatedRun:
 def simulated_run(scenario: Scenario) -> SimulatedRun:
     """Fly the scenario, and place its returns by the true poses."""
     setup = prepare(scenario)
-    ranger, rig = replace(setup.sensors.ranger, movers=()), setup.rig
+    ranger, rig = setup.sensors.ranger, setup.rig
+    ranger = replace(ranger, bodies=[b for b in ranger.bodies if not isinstance(b, Airframe)])
     points, times = [], []
     far = scenario.scene in {"town", "dam"}
     thinning = THINNING_FAR if far else THINNING[scenario.head]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from bentwing.base.errors import EstimationError
 from bentwing.closing.localize.placement import place_in_map
-from bentwing.closing.places import describe_stream, match_places
+from bentwing.closing.places import MatchSettings, describe_stream, match_places
 from bentwing.map.project import project
 
 if TYPE_CHECKING:
@@ -18,6 +18,10 @@ if TYPE_CHECKING:
     from bentwing.closing.localize.prior_map import PriorMap
     from bentwing.closing.places import Candidate, Place
     from bentwing.recording import Batch
+
+
+# Who names a map knows which site it is of, and that things may have been moved there since.
+SAME_SITE = MatchSettings(max_changed=0.05)
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +65,7 @@ def find_in_map(
         threads=threads,
     )
     places = describe_stream(chunks, estimate.trajectory, estimate.spans)
-    candidates = match_places(prior.places, places)
+    candidates = match_places(prior.places, places, settings=SAME_SITE)
     record: dict[str, Any] = {
         "map": str(prior.path),
         "map_points": prior.n_points,
@@ -111,4 +115,6 @@ def _candidate(candidate: Candidate, places: Sequence[Place]) -> dict[str, Any]:
         "n_inliers": candidate.n_inliers,
         "overlap": None if agreement is None else agreement.overlap,
         "agreement": None if agreement is None else agreement.agreement,
+        "conflict": None if agreement is None else agreement.conflict,
+        "changed": agreement is not None and agreement.things is not None,
     }

@@ -116,7 +116,7 @@ class MatchSettings(Settings):
         "little that stands elsewhere",
     )
     max_pierced: float = Field(
-        default=0.005,
+        default=0.05,
         ge=0,
         le=1,
         description="largest share of the walls that beams passed through where things were moved",

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from bentwing.closing.places.cloud import Surfels
     from bentwing.closing.places.place import Place
 
-# A wall goes on in its plane: so many surfels are in it at these distances, m, as far as a car is long and farther.
-_GOES_ON, _FARTHEST, _IN_PLANE = 4.5, 8.0, 4
+# A wall goes on in its plane, farther than a car is long: so many surfels are in it between these distances, m.
+_GOES_ON = ((2.2, 4.5, 3), (4.5, 8.0, 4))
 # In one plane are surfels whose normals differ by little, and that are so far off the planes of each other, m: the
 # nearer of the two, as the normal of half a metre of wall is a degree off, and the farther.
 _PARALLEL = np.cos(np.radians(6.0))
@@ -99,20 +99,31 @@ class _Planes:
 
 def _go_on(planes: Surfels) -> NDArray[np.bool_]:
     """Whether planes (P,) are part of one that is longer than things are."""
+    first, second, distances = _in_one_plane(planes)
+    on = np.ones(len(planes), dtype=np.bool_)
+    for least, most, needed in _GOES_ON:
+        ring = (distances > least) & (distances <= most)
+        ends = np.concatenate([first[ring], second[ring]])
+        on &= np.bincount(ends, minlength=len(planes)) >= needed
+    return on
+
+
+def _in_one_plane(
+    planes: Surfels,
+) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float64]]:
+    """Find the pairs (K,) of planes that are parts of one, and their distances, m."""
     from scipy.spatial import cKDTree
 
     points, normals = planes.means, planes.normals
-    pairs = cKDTree(points).query_pairs(_FARTHEST, output_type="ndarray") if len(points) else []
+    reach = _GOES_ON[-1][1]
+    pairs = cKDTree(points).query_pairs(reach, output_type="ndarray") if len(points) else []
     first, second = np.asarray(pairs, dtype=np.intp).reshape(-1, 2).T
+    parallel = np.abs(np.einsum("ni,ni->n", normals[first], normals[second])) > _PARALLEL
+    first, second = first[parallel], second[parallel]
     between = points[first] - points[second]
-    far = (between**2).sum(axis=1) > _GOES_ON**2
-    cosines = np.einsum("ni,ni->n", normals[first], normals[second])
-    far &= np.abs(cosines) > _PARALLEL
-    first, second, between = first[far], second[far], between[far]
     off = [np.abs(np.einsum("ni,ni->n", between, normals[rows])) for rows in (first, second)]
     same = (np.minimum(*off) < _OFF_ONE) & (np.maximum(*off) < _OFF_OTHER)
-    counts = np.bincount(np.concatenate([first[same], second[same]]), minlength=len(points))
-    return np.asarray(counts >= _IN_PLANE)
+    return first[same], second[same], np.linalg.norm(between[same], axis=1)
 
 
 def _are_on(walls: Surfels, others: Surfels) -> NDArray[np.bool_]:

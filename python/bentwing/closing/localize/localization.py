@@ -99,9 +99,19 @@ def _unplaced(prior: PriorMap, places: Sequence[Place], candidates: Sequence[Can
         )
     return (
         f"{prior.path}: none of the {len(places)} places of the recording was recognized among "
-        f"the {len(prior.places)} of the map; run.json says why under localization. Is it the same "
-        "site, seen from near enough, and is the map level?"
+        f"the {len(prior.places)} of the map{_nearest(candidates)}; run.json says why under "
+        "localization. Is it the same site, seen from near enough, and is the map level?"
     )
+
+
+def _nearest(candidates: Sequence[Candidate]) -> str:
+    """Say why the pair of places that is most alike was refused, if any was alike at all."""
+    alike = [
+        (c.agreement.agreement * c.agreement.overlap, c.reason)
+        for c in candidates
+        if c.agreement is not None and c.agreement.agreement >= SAME_SITE.min_agreement
+    ]
+    return f" (of the two that are most alike {max(alike)[1]})" if alike else ""
 
 
 def _candidate(candidate: Candidate, places: Sequence[Place]) -> dict[str, Any]:

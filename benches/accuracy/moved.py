@@ -138,9 +138,12 @@ def rows_of(scene: str, head: str, seeds: Sequence[int], keep: Path | None) -> I
             f"{sum(one[k] is True for one in found)}, {sum(one[k] is False for one in found)}"
             for k in range(2)
         ]
-        shares = conflicts[name] or [np.nan]
-        spread = " to ".join(f"{100 * np.quantile(shares, q):.1f}" for q in (0.1, 0.9))
-        yield [f"{scene}, {head}", name, f"{spread} %", *counts, f"{len(found)}"]
+        shares = conflicts[name]
+        spread = "-"
+        if shares:
+            ends = (f"{100 * np.quantile(shares, q):.1f}" for q in (0.1, 0.9))
+            spread = f"{' to '.join(ends)} %"
+        yield [f"{scene}, {head}", name, spread, *counts, f"{len(found)}"]
 
 
 def likely(candidates: Sequence[Candidate], b: Flown, T_a_b: np.ndarray | None) -> list[float]:

@@ -80,23 +80,22 @@ class Agreement:
             )
         most = settings.max_leafy_conflict if np.isnan(self.distance) else settings.max_conflict
         if self.conflict > most:
-            why = self._unexplained(settings)
-            said = f"{self.conflict:.1%} stand where the other place saw through, "
-            return why and said + (f"{most:.1%} are allowed" if self.things is None else why)
+            why = self._unexplained(settings, most)
+            return why and f"{self.conflict:.1%} stand where the other place saw through, {why}"
         return None
 
     def may_have_changed(self, settings: MatchSettings) -> bool:
         """Whether conflicts are more than those of one day, and not too many for things that were moved."""
         return settings.max_conflict < self.conflict <= settings.max_changed
 
-    def _unexplained(self, settings: MatchSettings) -> str | None:
+    def _unexplained(self, settings: MatchSettings, most: float) -> str | None:
         """Return why it is not things moved in between that explain the conflicts; None if it is.
 
         Walls are not moved. Of the things most must be where they were, as in a room that is built alike
         hardly any is; and a match that something speaks against must be sure.
         """
         if self.things is None:
-            return "more than things that were moved would be"
+            return f"{max(most, settings.max_changed):.1%} are allowed"
         if self.things.share_pierced > settings.max_pierced:
             return f"{self.things.pierced} of {self.things.walls} on walls, which are not moved"
         if self.things.kept < _MIN_KEPT or self.things.share_kept < settings.min_kept:

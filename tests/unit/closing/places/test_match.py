@@ -72,7 +72,7 @@ def test_what_was_moved_does_not_excuse_walls_that_cannot_be_there():
         (Things(kept=60, moved=20, walls=500, pierced=100), "100 of 500 on walls"),
         (Things(kept=20, moved=60, walls=500, pierced=0), "of 80 faces of things 20 are"),
         (Things(kept=5, moved=1, walls=500, pierced=0), "of 6 faces of things 5 are"),
-        (None, "0.6% are allowed"),
+        (None, "5.0% are allowed"),
     ):
         assert words in replace(changed, things=worse).objection(settings)
     assert "agreement is 0.75" in replace(changed, agreement=0.75).objection(settings)

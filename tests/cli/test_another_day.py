@@ -107,7 +107,7 @@ def test_boxes_that_are_gone_have_disappeared_and_no_other_area_has(may, june):
 
 def test_the_command_says_how_much_has_changed_and_the_report_shows_it(june):
     _, later, said = june
-    assert "since the map was made, " in said
+    assert "changed since the map was made: " in said
     assert "4 disappeared" in said
     page = (later / "report.html").read_text()
     assert "Changed area" in page

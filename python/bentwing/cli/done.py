@@ -35,13 +35,14 @@ def say_changes(out: Path, written: WrittenMap | None, *, quiet: bool) -> None:
     """Say what has changed since the map was made in which a recording was found."""
     if quiet or written is None or written.change is None:
         return
-    areas = written.change.areas()
-    counts = [
-        (sum(one.kind == kind for one in areas), kind) for kind in ("appeared", "disappeared")
-    ]
-    said = " and ".join(f"{n} {kind}" for n, kind in counts if n)
-    where = f", the largest of {areas[0].area:.1f} m²; the report shows where" if areas else ""
-    typer.echo(f"{out}: since the map was made, {said or 'nothing has changed'}{where}")
+    areas, said = written.change.areas(), "nothing has changed since the map was made"
+    if areas:
+        new = sum(one.kind == "appeared" for one in areas)
+        said = (
+            f"areas changed since the map was made: {new} appeared, {len(areas) - new} disappeared, "
+            f"the largest of {areas[0].area:.1f} m²; the report shows where"
+        )
+    typer.echo(f"{out}: {said}")
 
 
 def say_maps(merged: Merged, *, quiet: bool) -> None:

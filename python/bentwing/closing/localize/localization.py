@@ -111,7 +111,11 @@ def _nearest(candidates: Sequence[Candidate]) -> str:
         for c in candidates
         if c.agreement is not None and c.agreement.agreement >= SAME_SITE.min_agreement
     ]
-    return f" (what speaks against the two that are most alike: {max(alike)[1]})" if alike else ""
+    return (
+        f" (what speaks against the two places that are most alike: {max(alike)[1]})"
+        if alike
+        else ""
+    )
 
 
 def _candidate(candidate: Candidate, places: Sequence[Place]) -> dict[str, Any]:

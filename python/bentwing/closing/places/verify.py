@@ -102,7 +102,7 @@ class Agreement:
             n = self.things.kept + self.things.moved
             return (
                 f"and of {n} faces of things {self.things.kept} are where they were: "
-                f"{settings.min_kept:.0%} are needed, and {_MIN_KEPT}"
+                f"{settings.min_kept:.0%} are needed, at least {_MIN_KEPT}"
             )
         if not self.is_sure(settings):
             return f"and agreement is {self.agreement:.3g}, too little where things were moved"

@@ -90,8 +90,7 @@ def test_a_recording_is_localized_in_the_map_of_another_flight(site, flights, be
     )  # fmt: skip
     assert said.code == 0, said.err
     assert said.out == (
-        f"{out}: nothing has changed since the map was made\n"
-        f"{out}: good; open {out}/report.html\n"
+        f"{out}: nothing has changed since the map was made\n{out}: good; open {out}/report.html\n"
     )
     assert {"trajectory.txt", "map.laz", "appeared.laz", "disappeared.laz", "run.json"} <= names_in(
         out

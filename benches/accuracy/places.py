@@ -43,6 +43,7 @@ from bentwing.closing.places import Place, PlaceSettings, cut_places, describe_p
 if TYPE_CHECKING:
     from benches.support.place_clouds import FlightKind
     from bentwing.base.trajectory import Trajectory
+    from bentwing.simulate import Scenario
 
 RIGHT = 0.3
 OVERLAPPING = 0.4
@@ -150,7 +151,7 @@ def of_scene(flight: FlightKind, chosen: argparse.Namespace, peer: Peer | None) 
     """Compare the flights of one scene."""
     tally, before = Tally(), None
     for seed in chosen.seeds:
-        flights = [flown(flight, seed, number, chosen.keep) for number in range(2)]
+        flights = [flown(flight.scenario(seed, number), chosen.keep) for number in range(2)]
         same_world(f"{flight.scene} {seed}", *flights, tally, peer, rejected=chosen.rejected)
         if before is not None:
             outcome = merged(before, flights[1], None)
@@ -163,8 +164,8 @@ def of_scene(flight: FlightKind, chosen: argparse.Namespace, peer: Peer | None) 
     return tally
 
 
-def flown(flight: FlightKind, seed: int, number: int, keep: Path | None) -> Flown:
-    run = kept_run(flight.scenario(seed, number), keep)
+def flown(scenario: Scenario, keep: Path | None) -> Flown:
+    run = kept_run(scenario, keep)
     parts = cut_places(run.points, run.times, run.trajectory)
     clouds = [part.points[:: -(-len(part.points) // PlaceSettings().max_points)] for part in parts]
     return Flown(describe_parts(parts), clouds, run.trajectory, run.T_world_map)

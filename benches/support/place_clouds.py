@@ -14,7 +14,7 @@ import numpy as np
 
 from bentwing.base.trajectory import Trajectory
 from bentwing.base.transform import upright
-from bentwing.simulate.ranging import nodes_around
+from bentwing.simulate.ranging import Airframe, nodes_around
 from bentwing.simulate.scenario import Scenario
 from bentwing.simulate.simulation import prepare
 
@@ -50,7 +50,8 @@ class SimulatedRun:
 def simulated_run(scenario: Scenario) -> SimulatedRun:
     """Fly the scenario, and place its returns by the true poses."""
     setup = prepare(scenario)
-    ranger, rig = replace(setup.sensors.ranger, movers=()), setup.rig
+    ranger, rig = setup.sensors.ranger, setup.rig
+    ranger = replace(ranger, bodies=[b for b in ranger.bodies if not isinstance(b, Airframe)])
     points, times = [], []
     far = scenario.scene in {"town", "dam"}
     thinning = THINNING_FAR if far else THINNING[scenario.head]
@@ -122,7 +123,7 @@ def kept_run(scenario: Scenario, folder: Path | None) -> SimulatedRun:
     """Return the run as kept in `folder`, or fly it, and keep it there."""
     if folder is None:
         return simulated_run(scenario)
-    path = folder / f"{scenario.scene}_{scenario.seed}_{(scenario.flight_seed or 0) % 100}.npz"
+    path = folder / f"{_name(scenario)}.npz"
     if not path.exists():
         folder.mkdir(parents=True, exist_ok=True)
         run = simulated_run(scenario)
@@ -139,3 +140,10 @@ def kept_run(scenario: Scenario, folder: Path | None) -> SimulatedRun:
     upright = np.tile([0.0, 0.0, 0.0, 1.0], (len(kept["tt"]), 1))
     track = Trajectory(kept["tt"], kept["tp"], upright)
     return SimulatedRun(kept["points"].astype(np.float64), kept["times"], track, kept["T"])
+
+
+def _name(scenario: Scenario) -> str:
+    number = (scenario.flight_seed or 0) % 100
+    name = f"{scenario.scene}_{scenario.seed}_{number}_{scenario.head}"
+    things = "" if scenario.things_seed is None else f"_things{scenario.things_seed}"
+    return name + things + (f"_boxes{scenario.boxes}" if scenario.boxes else "")

@@ -89,7 +89,9 @@ def test_a_recording_is_localized_in_the_map_of_another_flight(site, flights, be
         "-p", second / "payload.yaml", "-o", out, *THIN,
     )  # fmt: skip
     assert said.code == 0, said.err
-    assert said.out == f"{out}: good; open {out}/report.html\n"
+    assert said.out == (
+        f"{out}: nothing has changed since the map was made\n{out}: good; open {out}/report.html\n"
+    )
     assert {"trajectory.txt", "map.laz", "appeared.laz", "disappeared.laz", "run.json"} <= names_in(
         out
     )

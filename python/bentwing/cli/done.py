@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
     from bentwing.evaluate.verdict import Verdict
     from bentwing.fleet.record import Site
+    from bentwing.run.found import WrittenMap
     from bentwing.run.merging import Merged
 
 
@@ -28,6 +29,20 @@ def say_run(out: Path, verdict: Verdict, *, quiet: bool) -> None:
     _require([(out, verdict)])
     if not quiet or verdict.state == "doubtful":
         typer.echo(f"{out}: {verdict.sentence()}; open {out / 'report.html'}", err=quiet)
+
+
+def say_changes(out: Path, written: WrittenMap | None, *, quiet: bool) -> None:
+    """Say what has changed since the map was made in which a recording was found."""
+    if quiet or written is None or written.change is None:
+        return
+    areas, said = written.change.areas(), "nothing has changed since the map was made"
+    if areas:
+        new = sum(one.kind == "appeared" for one in areas)
+        said = (
+            f"areas changed since the map was made: {new} appeared, {len(areas) - new} disappeared, "
+            f"the largest of {areas[0].area:.1f} m²; the report shows where"
+        )
+    typer.echo(f"{out}: {said}")
 
 
 def say_maps(merged: Merged, *, quiet: bool) -> None:

@@ -51,7 +51,7 @@ def command(
     """
     # slow to import, so only when it is needed
     from bentwing.base.progress import create_progress
-    from bentwing.cli.done import say_run
+    from bentwing.cli.done import say_changes, say_run
     from bentwing.recording.sections.project import Project
     from bentwing.run.choose import choose, given
     from bentwing.run.pipeline import run_recording
@@ -73,4 +73,5 @@ def command(
     chosen = choose(settings, set_, payload, options_given)
     progress = create_progress(quiet=quiet)
     found = run_recording(recording, out, chosen, payload, resume=resume, progress=progress)
+    say_changes(out, found.map, quiet=quiet)
     say_run(out, found.verdict, quiet=quiet)

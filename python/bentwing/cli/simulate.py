@@ -36,6 +36,7 @@ EXAMPLES = (
     "bentwing simulate courtyard -o recording --duration 30",
     "bentwing simulate office --head vlp16-motor --flight stand -o stand",
     "bentwing simulate town --gnss rtk --format mcap -o town",
+    "bentwing simulate courtyard --seed 4 --flight-seed 8 --boxes 3 -o later",
     "bentwing simulate office --event spin-stall --stall 10 -o stall",
     "bentwing simulate office --fault gyro-degrees -o degrees",
     "bentwing simulate courtyard --realism 3 --realism-only stamps -o late",
@@ -70,6 +71,22 @@ def command(
             WORLD,
             metavar="N",
             help="Seed of all but the geometry: another flight in the world of --seed.",
+        ),
+    ] = None,
+    boxes: Annotated[
+        int,
+        option(
+            WORLD,
+            metavar="N",
+            help="Boxes on the ground, elsewhere in every flight of the world: another day.",
+        ),
+    ] = 0,
+    things_seed: Annotated[
+        int | None,
+        option(
+            WORLD,
+            metavar="N",
+            help="Seed of what stands in courtyard, office, carpark: a storey built alike.",
         ),
     ] = None,
     flight: Annotated[
@@ -168,6 +185,8 @@ def command(
         "duration": duration,
         "seed": seed,
         "flight_seed": flight_seed,
+        "boxes": boxes,
+        "things_seed": things_seed,
         "format": bag_format,
         "motor_rate": motor_rate,
         "spin": spin,

@@ -26,6 +26,7 @@ from bentwing.simulate.ranging import RangeErrors
 
 _SURVEYED = ("walls", "dam")
 _DRIVEN = ("street",)
+_FURNISHED = ("courtyard", "office", "carpark")
 FASTEST_TOUR = 5.0
 """m/s."""
 
@@ -42,6 +43,9 @@ class Scenario(Settings):
     seed : varies geometry, motion, calibration and noise
     flight_seed : varies all of that but the geometry: another flight in the world of `seed`; by
         default `seed`
+    things_seed : varies what stands in a `courtyard`, `office` or `carpark`, and neither walls nor pillars:
+        another storey that is built alike; by default `seed` does
+    boxes : that stand on the free ground of a tour, each flight's elsewhere: another day in the world of `seed`
     format : of the recording: a ROS 1 bag, or a ROS 2 folder with mcap or sqlite storage
     motor_rate : rad/s, of a motor-turned head
     spin : of `hokuyo-spin`: a `steady` rate that wanders a little, or driven by the simulated `plant`
@@ -65,6 +69,8 @@ class Scenario(Settings):
     duration: float = Field(default=60.0, gt=0.0, le=3600.0)
     seed: int = Field(default=0, ge=0, le=2**63 - 1)
     flight_seed: int | None = Field(default=None, ge=0, le=2**63 - 1)
+    things_seed: int | None = Field(default=None, ge=0, le=2**63 - 1)
+    boxes: int = Field(default=0, ge=0, le=100)
     format: RecordingFormat = "bag"
     motor_rate: float = Field(default=1.0, gt=0.0, le=10.0)
     spin: SpinName = "steady"
@@ -95,6 +101,16 @@ class Scenario(Settings):
     def _groups_have_a_size(self) -> Scenario:
         if self.realism_only and not self.realism:
             msg = "realism_only chooses groups of errors that have no size: give realism as well"
+            raise ValueError(msg)
+        return self
+
+    @model_validator(mode="after")
+    def _has_things(self) -> Scenario:
+        if self.things_seed is not None and self.scene not in _FURNISHED:
+            msg = f"things_seed: only {', '.join(_FURNISHED)} can be furnished in another way"
+            raise ValueError(msg)
+        if self.boxes and self.flight not in ("tour", "stand"):
+            msg = f"boxes: none are seen from a {self.flight}; they stand on the ground of a tour"
             raise ValueError(msg)
         return self
 
@@ -146,7 +162,8 @@ class Scenario(Settings):
 
     def rng(self, purpose: str) -> np.random.Generator:
         """Random numbers that depend on the seed and on what they are for."""
-        of_world = purpose in ("scene", "place") or self.flight_seed is None
-        return np.random.default_rng(
-            [self.seed if of_world else self.flight_seed, *purpose.encode()]
-        )
+        of_world = purpose in ("scene", "place", "boxes") or self.flight_seed is None
+        seed = self.seed if of_world else self.flight_seed
+        if purpose == "things":
+            seed = self.things_seed
+        return np.random.default_rng([seed, *purpose.encode()])

@@ -16,6 +16,7 @@ from bentwing.simulate.lidars.interface import LidarClock
 from bentwing.simulate.ranging import Airframe, Body, Ranger
 from bentwing.simulate.realism.draw import Realism
 from bentwing.simulate.scenes import SCENES, World
+from bentwing.simulate.scenes.boxes import with_boxes
 from bentwing.simulate.setup import Setup
 from bentwing.simulate.stream import Sensors
 from bentwing.simulate.write import SimulatedRecording, write_recording
@@ -26,14 +27,14 @@ if TYPE_CHECKING:
 
     from bentwing.simulate.rig import Rig
     from bentwing.simulate.scenario import Scenario
+    from bentwing.simulate.scenes import Site
 
 
 def prepare(scenario: Scenario) -> Setup:
     """Build the world, plan the motion and hang the sensors on it."""
     first = LEAD if "motion-start" in scenario.events else 0.0
     last = first + scenario.duration
-    site = SCENES[scenario.scene](scenario.rng("scene"))
-    world = World(site if scenario.speed is None else replace(site, speed=scenario.speed))
+    world = World(_site(scenario))
     realism = Realism(scenario, last)
     rig = realism.rig(build_rig(scenario, world, last))
     rng = scenario.rng("lidar")
@@ -62,6 +63,16 @@ def prepare(scenario: Scenario) -> Setup:
     host, samples = realism.host(), realism.samples(rig)
     sensors = Sensors(rig, ranger, imu, clock, losses, rng, receiver, host, samples)
     return Setup(world, rig, sensors, first, last, realism)
+
+
+def _site(scenario: Scenario) -> Site:
+    """Build the scene, and stand in it what a flight finds there."""
+    furnished = {} if scenario.things_seed is None else {"things": scenario.rng("things")}
+    site = SCENES[scenario.scene](scenario.rng("scene"), **furnished)
+    if scenario.boxes:
+        spots = scenario.rng("where boxes stand")
+        site = with_boxes(site, scenario.boxes, scenario.rng("boxes"), spots)
+    return site if scenario.speed is None else replace(site, speed=scenario.speed)
 
 
 def _movers(scenario: Scenario, world: World, rig: Rig, middle: float) -> list[Body]:

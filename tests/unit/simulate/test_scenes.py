@@ -3,6 +3,7 @@ import numpy as np
 import pytest
 
 from bentwing._core import Scene
+from bentwing.base.errors import UsageError
 from bentwing.simulate.planner import follow_route, plan_tour
 from bentwing.simulate.scenario import Scenario
 from bentwing.simulate.scenes import SCENES, World
@@ -100,3 +101,53 @@ def test_a_route_can_be_flown_with_every_seed(name, seed):
     positions = setup.rig.imu(np.arange(0.0, 60.0, 0.5)).p
     assert np.ptp(positions[:, 0]) > 3.0
     assert positions[:, 2].max() < 6.0
+
+
+def grounded(scene, **choices):
+    return prepare(Scenario(scene=scene, seed=3, duration=25.0, **choices)).world.site.mesh
+
+
+@pytest.mark.parametrize("scene", ["office", "courtyard", "mine", "forest"])
+def test_boxes_stand_free_on_the_ground_and_elsewhere_in_another_flight(scene):
+    empty = grounded(scene, flight_seed=7)
+    one, other = (grounded(scene, flight_seed=number, boxes=4) for number in (7, 8))
+    n = len(empty.vertices)
+    for mesh in (one, other):
+        np.testing.assert_array_equal(mesh.vertices[:n], empty.vertices)
+    boxes = [mesh.vertices[n:].reshape(4, 8, 3) for mesh in (one, other)]
+    edges = [np.ptp(box, axis=1)[:, 2] for box in boxes]
+    np.testing.assert_allclose(*edges)  # the same boxes
+    centres = [box.mean(axis=1) for box in boxes]
+    assert np.linalg.norm(centres[0] - centres[1], axis=1).min() > 0.2
+    world = Scene(empty.vertices, empty.triangles)
+    tops = [box[box[:, 2] > box[:, 2].mean()] for box in np.concatenate(boxes)]
+    assert abs(world.distance(np.concatenate(tops))[0]).min() > 0.05
+
+
+def test_boxes_leave_the_way_of_a_car_park_free():
+    setup = prepare(Scenario(scene="carpark", seed=3, duration=30.0, boxes=6))
+    flown = setup.rig.imu(np.arange(8.0, 22.0, 0.5)).p
+    assert setup.world.clearance(flown).min() > 0.5
+
+
+def test_more_boxes_than_a_scene_has_room_for_are_refused():
+    with pytest.raises(UsageError, match="no room for 100 boxes"):
+        grounded("office", boxes=100)
+
+
+def test_things_of_another_seed_stand_between_the_same_walls():
+    one, other = (grounded("office", things_seed=seed) for seed in (None, 5))
+    same = (one.vertices == other.vertices).all(axis=1)
+    n_walls = int(np.argmin(same))
+    assert n_walls > 300
+    assert not same[n_walls:].all()
+
+
+def test_a_scene_without_furniture_takes_no_other():
+    with pytest.raises(ValueError, match="things_seed"):
+        Scenario(scene="forest", things_seed=5)
+
+
+def test_no_boxes_are_stood_where_a_survey_cannot_see_them():
+    with pytest.raises(ValueError, match="boxes: none are seen from a survey"):
+        Scenario(scene="dam", boxes=2)

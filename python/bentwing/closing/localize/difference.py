@@ -29,8 +29,9 @@ _SPACING = 0.1
 _LOOK = 50_000
 # What fewer looks saw through may lie behind an edge.
 _MIN_LOOKS = 4
-# Beams of a look that are followed, and the voxels of what they pass, m.
-_BEAMS, _LOOKED = 6000, 0.4
+# Beams of a look that are followed, and the voxels of what they pass, m: a voxel beside a surface is not known to
+# be empty, so of larger ones the lower metre of a box would not have appeared.
+_BEAMS, _LOOKED = 12_000, 0.25
 # New points are kept this much apart, m, and changed ones believed with so many others within a radius, m.
 _FINE = 0.05
 _TOGETHER = 0.3

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from bentwing.base.errors import EstimationError
 from bentwing.closing.localize.placement import place_in_map
-from bentwing.closing.places import describe_stream, match_places
+from bentwing.closing.places import MatchSettings, describe_stream, match_places
 from bentwing.map.project import project
 
 if TYPE_CHECKING:
@@ -18,6 +18,10 @@ if TYPE_CHECKING:
     from bentwing.closing.localize.prior_map import PriorMap
     from bentwing.closing.places import Candidate, Place
     from bentwing.recording import Batch
+
+
+# Who names a map knows which site it is of, and that things may have been moved there since.
+SAME_SITE = MatchSettings(max_changed=0.05)
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +65,7 @@ def find_in_map(
         threads=threads,
     )
     places = describe_stream(chunks, estimate.trajectory, estimate.spans)
-    candidates = match_places(prior.places, places)
+    candidates = match_places(prior.places, places, settings=SAME_SITE)
     record: dict[str, Any] = {
         "map": str(prior.path),
         "map_points": prior.n_points,
@@ -95,8 +99,22 @@ def _unplaced(prior: PriorMap, places: Sequence[Place], candidates: Sequence[Can
         )
     return (
         f"{prior.path}: none of the {len(places)} places of the recording was recognized among "
-        f"the {len(prior.places)} of the map; run.json says why under localization. Is it the same "
-        "site, seen from near enough, and is the map level?"
+        f"the {len(prior.places)} of the map{_nearest(candidates)}; run.json says why under "
+        "localization. Is it the same site, seen from near enough, and is the map level?"
+    )
+
+
+def _nearest(candidates: Sequence[Candidate]) -> str:
+    """Say why the pair of places that is most alike was refused, if any was alike at all."""
+    alike = [
+        (c.agreement.agreement * c.agreement.overlap, c.reason)
+        for c in candidates
+        if c.agreement is not None and c.agreement.agreement >= SAME_SITE.min_agreement
+    ]
+    return (
+        f" (what speaks against the two places that are most alike: {max(alike)[1]})"
+        if alike
+        else ""
     )
 
 
@@ -111,4 +129,6 @@ def _candidate(candidate: Candidate, places: Sequence[Place]) -> dict[str, Any]:
         "n_inliers": candidate.n_inliers,
         "overlap": None if agreement is None else agreement.overlap,
         "agreement": None if agreement is None else agreement.agreement,
+        "conflict": None if agreement is None else agreement.conflict,
+        "changed": agreement is not None and agreement.things is not None,
     }

@@ -14,7 +14,11 @@ from bentwing.base.voxels import by_key, voxel_keys
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+FLAT = 0.85
+"""|n_z| of floors, ceilings and ground: any two upright places agree on them."""
 _SIDED = 0.4  # planarity from which a surfel has two sides
+_PLANAR = 0.6  # planarity of a plane
+_THIN = 0.03  # m, standard deviation of a plane's points across it
 _MIN_POINTS = 6  # of a surfel: as many as its moments have numbers
 
 
@@ -66,6 +70,13 @@ def opposed(a: Surfels, b: Surfels, R: NDArray[np.float64]) -> NDArray[np.bool_]
     planes = np.minimum(a.planarity, b.planarity) > _SIDED
     other: NDArray[np.bool_] = planes & (cosines < -0.5)
     return other
+
+
+def is_plane(surfels: Surfels) -> NDArray[np.bool_]:
+    """Whether surfels (S,) are thin and extended in two directions."""
+    across = np.einsum("ni,nij,nj->n", surfels.normals, surfels.covariances, surfels.normals)
+    planes: NDArray[np.bool_] = (surfels.planarity > _PLANAR) & (across < _THIN**2)
+    return planes
 
 
 def surfels_of(

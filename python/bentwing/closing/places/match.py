@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,6 +13,7 @@ from bentwing.closing.places.consensus import Hypothesis, hypotheses
 from bentwing.closing.places.metric import Metric, default_metric
 from bentwing.closing.places.refine import COARSE, FINE, Alignment, refine
 from bentwing.closing.places.settings import MatchSettings
+from bentwing.closing.places.things import compare_things
 from bentwing.closing.places.verify import Agreement, quick_score, verify
 from bentwing.closing.places.vote import likely_pairs, vote
 
@@ -201,12 +202,15 @@ def _judged(
     known.append(alignment.T_a_b)
     agreement = verify(a, b, trees, alignment.T_a_b)
     # a finer alignment takes most of the time, and does not move what stands in the way
-    hopeless = agreement.conflict > max(settings.max_conflict, settings.max_leafy_conflict)
+    most = max(settings.max_conflict, settings.max_leafy_conflict, settings.max_changed)
+    hopeless = agreement.conflict > most
     if agreement.agreement > _WORTH_REFINING and not hopeless:
         finer = refine(a.surfels, trees[0], b.surfels, alignment.T_a_b, FINE)
         if finer is None:
             return Candidate(*named, _FAR, hypothesis.n_inliers)
         alignment, agreement = finer, verify(a, b, trees, finer.T_a_b)
+    if agreement.may_have_changed(settings):
+        agreement = replace(agreement, things=compare_things(a, b, alignment.T_a_b))
     reason = agreement.objection(settings) or _leaning(alignment.T_a_b)
     return Candidate(*named, reason, hypothesis.n_inliers, alignment, agreement)
 

@@ -107,6 +107,26 @@ class MatchSettings(Settings):
         le=1,
         description="the same without planes: leaves let some beams through",
     )
+    max_changed: float = Field(
+        default=0.0,
+        ge=0,
+        le=1,
+        description="the same where things may have been moved in between: walls must stand, and most "
+        "things; for who knows that it is the same site, as `localize` is told, and 0 tells rooms apart by "
+        "little that stands elsewhere",
+    )
+    max_pierced: float = Field(
+        default=0.05,
+        ge=0,
+        le=1,
+        description="largest share of the walls that beams passed through where things were moved",
+    )
+    min_kept: float = Field(
+        default=0.55,
+        ge=0,
+        le=1,
+        description="least share of the faces of things that are where they were where some were moved",
+    )
     max_distance: Metres = Field(
         default=0.025,
         gt=0,

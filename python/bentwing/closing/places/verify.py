@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bentwing.base.transform import apply, inverse
-from bentwing.closing.places.cloud import opposed
+from bentwing.closing.places.cloud import FLAT, is_plane, opposed
 from bentwing.closing.places.refine import SIGMA
 
 if TYPE_CHECKING:
@@ -19,18 +19,17 @@ if TYPE_CHECKING:
     from bentwing.closing.places.cloud import Surfels
     from bentwing.closing.places.place import Place
     from bentwing.closing.places.settings import MatchSettings
+    from bentwing.closing.places.things import Things
 
 _NEAR = 0.8  # m; a surfel with none of the other place's within it was out of that one's sight
 _ALIKE = 9.0  # squared standard deviations between two surfels of the same surface
-_FLAT = 0.85  # |n_z| of floors, ceilings and ground: upright places always agree on them
-_PLANAR = 0.6
 _QUICK = 300  # surfels of a quick look
 _DAMNING = 6.0  # how much more a surfel in free space says than one where it should be
 _SIMILAR = np.cos(np.radians(30.0))
 _CLOSE = 0.3  # m, across a plane
-_THIN = 0.03  # m, standard deviation of a plane's points across it
 _MIN_PLANES = 30  # for their median distance to mean something
 _PLANELESS = 0.05  # of agreement, that is needed more or less without planes
+_MIN_KEPT = 10  # faces of things, for their share to mean anything
 _MIN_SURFELS = 80  # that are not flat, for shares to mean anything
 
 
@@ -51,6 +50,7 @@ class Agreement:
     n_alike : surfels that are alike
     distance : m, median distance across the planes of surfels near each other; NaN without planes
     blind : whether of one of the places it is not known what was seen through
+    things : which of them were moved, where conflicts had to be explained by that
     """
 
     overlap: float
@@ -60,6 +60,7 @@ class Agreement:
     n_alike: int
     distance: float
     blind: bool = False
+    things: Things | None = None
 
     def objection(self, settings: MatchSettings) -> str | None:
         """Why the places are not believed to be the same, or None if they are."""
@@ -79,10 +80,32 @@ class Agreement:
             )
         most = settings.max_leafy_conflict if np.isnan(self.distance) else settings.max_conflict
         if self.conflict > most:
+            why = self._unexplained(settings, most)
+            return why and f"{self.conflict:.1%} stand where the other place saw through, {why}"
+        return None
+
+    def may_have_changed(self, settings: MatchSettings) -> bool:
+        """Whether conflicts are more than those of one day, and not too many for things that were moved."""
+        return settings.max_conflict < self.conflict <= settings.max_changed
+
+    def _unexplained(self, settings: MatchSettings, most: float) -> str | None:
+        """Return why it is not things moved in between that explain the conflicts; None if it is.
+
+        Walls are not moved. Of the things most must be where they were, as in a room that is built alike
+        hardly any is; and a match that something speaks against must be sure.
+        """
+        if self.things is None:
+            return f"{max(most, settings.max_changed):.1%} are allowed"
+        if self.things.share_pierced > settings.max_pierced:
+            return f"{self.things.pierced} of {self.things.walls} on walls, which are not moved"
+        if self.things.kept < _MIN_KEPT or self.things.share_kept < settings.min_kept:
+            n = self.things.kept + self.things.moved
             return (
-                f"{self.conflict:.1%} stand where the other place saw through, "
-                f"{most:.1%} are allowed"
+                f"and of {n} faces of things {self.things.kept} are where they were: "
+                f"{settings.min_kept:.0%} are needed, at least {_MIN_KEPT}"
             )
+        if not self.is_sure(settings):
+            return f"and agreement is {self.agreement:.3g}, too little where things were moved"
         return None
 
     @property
@@ -155,7 +178,7 @@ def quick_score(place: Place, tree: cKDTree, surfels: Surfels, T: NDArray[np.flo
     The share that comes near a surfel with a similar normal, less `_DAMNING` times the share that
     ends where the place saw through: rooms that are built alike have much in common.
     """
-    upright = np.flatnonzero(np.abs(surfels.normals[:, 2]) < _FLAT)
+    upright = np.flatnonzero(np.abs(surfels.normals[:, 2]) < FLAT)
     some = upright[:: -(-len(upright) // _QUICK) or 1]
     if not len(some):
         return 0.0
@@ -178,7 +201,7 @@ def _median(values: NDArray[np.float64]) -> float:
 
 def _view(place: Place, tree: cKDTree, surfels: Surfels, T: NDArray[np.float64]) -> _View:
     """See the surfels of another place, moved by `T`, from `place`."""
-    upright = np.abs(surfels.normals @ T[2, :3]) < _FLAT
+    upright = np.abs(surfels.normals @ T[2, :3]) < FLAT
     moved, R = apply(T, surfels.means[upright]), T[:3, :3]
     distances, nearest = tree.query(moved, k=1, distance_upper_bound=_NEAR)
     near = np.isfinite(distances)
@@ -198,17 +221,10 @@ def _view(place: Place, tree: cKDTree, surfels: Surfels, T: NDArray[np.float64])
     through = np.zeros(len(moved), dtype=np.bool_)
     if place.free is not None:
         through = place.free.contains(moved) & ~alike
-    planes = _is_plane(surfels)[upright][rows] & _is_plane(own)[columns]
+    planes = is_plane(surfels)[upright][rows] & is_plane(own)[columns]
     across = np.abs(np.einsum("ni,ni->n", residuals, own.normals[columns]))[planes]
     normals = surfels.normals[upright] @ R.T
     return _View(alike, near | through, through, moved, normals, across)
-
-
-def _is_plane(surfels: Surfels) -> NDArray[np.bool_]:
-    """Whether surfels are thin and extended in two directions."""
-    across = np.einsum("ni,nij,nj->n", surfels.normals, surfels.covariances, surfels.normals)
-    planes: NDArray[np.bool_] = (surfels.planarity > _PLANAR) & (across < _THIN**2)
-    return planes
 
 
 def _conditioning(view: _View) -> float:

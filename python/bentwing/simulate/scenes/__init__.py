@@ -23,11 +23,10 @@ from bentwing.simulate.scenes.world import Site, Survey, World
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    import numpy as np
 
 __all__ = ["SCENES", "Site", "Survey", "World"]
 
-SCENES: dict[str, Callable[[np.random.Generator], Site]] = {
+SCENES: dict[str, Callable[..., Site]] = {
     "courtyard": courtyard,
     "compound": compound,
     "office": office,

@@ -15,15 +15,18 @@ PILLARS = 7.8
 """m, from one to the next: three bays."""
 
 
-def carpark(rng: np.random.Generator) -> Site:
-    """Build six fields of three bays on both sides of a lane and a third row behind, about 47 × 22 m."""
+def carpark(rng: np.random.Generator, things: np.random.Generator | None = None) -> Site:
+    """Build six fields of three bays on both sides of a lane and a third row behind, about 47 × 22 m.
+
+    `things` draws the cars; by default `rng` does.
+    """
     length, height = 6 * PILLARS, rng.uniform(2.8, 3.1)
     width = 3 * BAY[0] + LANE
     floor = quad([(0, 0, 0), (length, 0, 0), (length, width, 0), (0, width, 0)])
     ceiling = quad([(0, width, height), (length, width, height), (length, 0, height), (0, 0, height)])  # fmt: skip
     parts = [floor, ceiling, *_walls(length, width, height), *_structure(length, width, height)]
     lane = BAY[0] + LANE / 2
-    parts += _cars(rng, length)
+    parts += _cars(things or rng, length)
     parts += [_pipe(length, y, height) for y in (1.2, width - 2.0)]
     route = ((5.0, lane, 1.35), (length - 5.0, lane, 1.35))
     low, high = (2.0, BAY[0] + 1.2, 1.1), (length - 2.0, BAY[0] + LANE - 1.2, 1.6)

@@ -12,13 +12,16 @@ from bentwing.simulate.scenes.world import Site
 DOOR = (2.0, 3.1, 0.0, 2.2)
 
 
-def courtyard(rng: np.random.Generator) -> Site:
-    """Open above; about 30 × 20 m, walls 6 to 9 m high."""
+def courtyard(rng: np.random.Generator, things: np.random.Generator | None = None) -> Site:
+    """Open above; about 30 × 20 m, walls 6 to 9 m high.
+
+    `things` draws what stands in it; by default `rng` does.
+    """
     length, width = rng.uniform(28.0, 32.0), rng.uniform(18.0, 21.0)
     height = smooth_noise(rng, 6.0, 0.035)
     floor = ground((-2.0, length + 2.0), (-2.0, width + 2.0), 0.5, height)
     walls = facades(rng, (length, width), (6.0, 9.0), (1.1, 4.0))
-    mesh = merge([floor, *walls, *_things(rng, length, width)])
+    mesh = merge([floor, *walls, *_things(things or rng, length, width)])
     return Site(mesh, (2.0, 2.0, 1.5), (length - 2.0, width - 2.0, 5.0), pad_below=0.2, speed=1.2)
 
 

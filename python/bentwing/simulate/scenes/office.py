@@ -13,8 +13,8 @@ WALL = 0.12
 DOOR = (0.4, 1.3, 0.0, 2.05)
 
 
-def office(rng: np.random.Generator) -> Site:
-    """About 15 × 10 m, 2.8 to 3.2 m high."""
+def office(rng: np.random.Generator, things: np.random.Generator | None = None) -> Site:
+    """About 15 × 10 m, 2.8 to 3.2 m high; `things` draws its furniture, by default `rng` does."""
     length, width = rng.uniform(14.0, 16.0), rng.uniform(9.5, 10.5)
     height = rng.uniform(2.85, 3.2)
     parts = [
@@ -22,7 +22,7 @@ def office(rng: np.random.Generator) -> Site:
         quad([(0, width, height), (length, width, height), (length, 0, height), (0, 0, height)]),
         *_outer_walls(length, width, height),
         *_partitions(rng, length, width, height),
-        *_furniture(rng, length, width, height),
+        *_furniture(things or rng, length, width, height),
     ]
     return Site(
         merge(parts), (0.9, 0.9, 0.95), (length - 0.9, width - 0.9, 2.1), pad_below=0.1, speed=0.8

@@ -6,8 +6,11 @@ import pytest
 
 from bentwing.base.transform import apply, inverse
 from bentwing.closing.places import Agreement, MatchSettings, describe_run, match_places
+from bentwing.closing.places.things import Things
 
 from .conftest import T_B_WORLD, moved, seen
+
+ANOTHER_DAY = MatchSettings(max_changed=0.05)
 
 
 def test_two_views_of_a_hall_find_each_other_whatever_their_headings(places_a, places_b):
@@ -34,6 +37,45 @@ def test_a_hall_in_which_half_of_the_things_stand_elsewhere_is_kept_apart(places
     assert not found.accepted
     assert "saw through" in found.reason
     assert found.agreement.agreement > MatchSettings().min_agreement
+
+
+def test_a_hall_in_which_a_few_things_were_moved_is_the_same_to_who_names_it(places_a):
+    later = describe_run(*moved(*seen(3, 1, changed=4), T_B_WORLD))
+    (of_one_day,) = match_places(places_a, later)
+    assert "saw through" in of_one_day.reason
+    (found,) = match_places(places_a, later, settings=ANOTHER_DAY)
+    assert found.accepted, found.reason
+    assert found.agreement.things.moved > 10
+    corners = np.array([[0.0, 0.0, 0.0], [18.0, 13.0, 5.0]])
+    there = apply(found.alignment.T_a_b, apply(T_B_WORLD, corners))
+    np.testing.assert_allclose(there, corners, atol=0.03)
+
+
+def test_a_hall_of_the_same_walls_with_all_things_elsewhere_is_another_one(places_a):
+    """However much may have changed: in the same hall most things would stand where they did."""
+    other = describe_run(*moved(*seen(4, 1), T_B_WORLD))
+    lenient = MatchSettings(max_changed=0.2)
+    (found,) = match_places(places_a, other, settings=lenient)
+    assert not found.accepted
+    assert "faces of things" in found.reason
+    things = found.agreement.things
+    assert things.share_pierced < lenient.max_pierced  # the walls agree
+    assert things.share_kept < 0.5 * lenient.min_kept
+
+
+def test_what_was_moved_does_not_excuse_walls_that_cannot_be_there():
+    settings = MatchSettings(max_changed=0.05)
+    moved_things = Things(kept=60, moved=20, walls=500, pierced=0)
+    changed = Agreement(0.6, 0.9, 0.03, 0.1, 400, 0.01, things=moved_things)
+    assert changed.objection(settings) is None
+    for worse, words in (
+        (Things(kept=60, moved=20, walls=500, pierced=100), "100 of 500 on walls"),
+        (Things(kept=20, moved=60, walls=500, pierced=0), "of 80 faces of things 20 are"),
+        (Things(kept=5, moved=1, walls=500, pierced=0), "of 6 faces of things 5 are"),
+        (None, "5.0% are allowed"),
+    ):
+        assert words in replace(changed, things=worse).objection(settings)
+    assert "agreement is 0.75" in replace(changed, agreement=0.75).objection(settings)
 
 
 def test_what_was_not_seen_through_must_agree_the_more():

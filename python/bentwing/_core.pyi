@@ -109,7 +109,7 @@ class LazCompressor:
 
     Parameters
     ----------
-    point_format : 0 to 10, of the LAS specification
+    point_format : of the LAS specification; 6
     n_extra_bytes : size of the extra dimensions of a point
     own_chunks : whether chunks are as large as `compress_chunks` says, else all are of one size
     """

@@ -7,6 +7,11 @@ use std::f32::consts::PI;
 use rayon::prelude::*;
 use thiserror::Error;
 
+mod layer;
+mod laz;
+
+pub use laz::{Appended, Chunks};
+
 /// Records per parallel task.
 const CHUNK: usize = 8192;
 /// Bytes of a record of point format 6 without extra bytes.

@@ -8,11 +8,10 @@ use ::laz::record::{LayeredPointRecordCompressor, RecordCompressor};
 use ::laz::{LasZipError, LazItem, LazItemRecordBuilder, LazVlr, LazVlrBuilder};
 use rayon::prelude::*;
 
-use crate::SIZE;
-use crate::layer::layers;
+use crate::layer;
+use crate::records::SIZE;
+use crate::returns::{self, N_LAYERS};
 
-/// Layers of what all records have.
-const N_LAYERS: usize = 9;
 /// Where the records say of which scanner they are.
 const SCANNER: usize = 15;
 const SCANNER_BITS: u8 = 0x30;
@@ -79,10 +78,18 @@ impl Chunks {
         if rows.clone().any(|row| row[SCANNER] & SCANNER_BITS != 0) {
             return layered(all, rows);
         }
-        let chunk = layered(common, rows.clone().map(|row| &row[..SIZE]))?;
-        let first = &records[..self.size];
-        let layers = layers(records, self.size, SIZE);
-        Ok(joined(&chunk, &first[SIZE..], &layers))
+        let of_all = match returns::layers(records, self.size) {
+            Some(layers) => layers,
+            None => split(&layered(common, rows.clone().map(|row| &row[..SIZE]))?),
+        };
+        let layers = [&of_all[..], &layer::layers(records, self.size, SIZE)].concat();
+        let sizes = layers.iter().map(|layer| layer.len() as u32);
+        let n = rows.len() as u32;
+        let head: Vec<u8> = std::iter::once(n)
+            .chain(sizes)
+            .flat_map(u32::to_le_bytes)
+            .collect();
+        Ok([&records[..self.size], &head, &layers.concat()].concat())
     }
 }
 
@@ -100,19 +107,19 @@ fn layered<'a>(
     Ok(compressor.into_inner())
 }
 
-/// The chunk with the extra bytes of its first record, and the layers of those of the others.
-fn joined(chunk: &[u8], first: &[u8], layers: &[Option<Vec<u8>>]) -> Vec<u8> {
-    let sizes = SIZE + 4 + 4 * N_LAYERS;
-    let mut joined = [&chunk[..SIZE], first, &chunk[SIZE..sizes]].concat();
-    for layer in layers {
-        let size = layer.as_ref().map_or(0, Vec::len) as u32;
-        joined.extend(size.to_le_bytes());
-    }
-    joined.extend(&chunk[sizes..]);
-    for layer in layers.iter().flatten() {
-        joined.extend(layer);
-    }
-    joined
+/// The layers of a chunk without extra bytes.
+fn split(chunk: &[u8]) -> [Vec<u8>; N_LAYERS] {
+    let (sizes, mut rest) = chunk[SIZE + 4..].split_at(4 * N_LAYERS);
+    std::array::from_fn(|k| {
+        let size = &sizes[4 * k..4 * k + 4];
+        let size = size
+            .iter()
+            .rev()
+            .fold(0, |n, &byte| n << 8 | usize::from(byte));
+        let (layer, behind) = rest.split_at(size);
+        rest = behind;
+        layer.to_vec()
+    })
 }
 
 /// Appends chunks to what a file has before its points.
@@ -205,47 +212,111 @@ mod tests {
         bytes.into_inner()
     }
 
-    /// Records whose extra bytes are constant, step by step, noisy, or one below the one before.
-    fn records(n: usize, seed: u64, scanners: u8) -> Vec<u8> {
-        let mut state = seed;
-        let mut next = || {
-            state = state
+    /// Pseudo-random numbers.
+    struct Chance(u64);
+
+    impl Chance {
+        fn below(&mut self, n: u64) -> u64 {
+            self.0 = self
+                .0
                 .wrapping_mul(6_364_136_223_846_793_005)
                 .wrapping_add(1);
-            (state >> 56) as u8
-        };
+            (self.0 >> 33) % n
+        }
+    }
+
+    /// What records are like beside their extra bytes.
+    #[derive(Clone, Copy, Debug)]
+    struct Kind {
+        scanners: u64,
+        /// Numbers of returns, and of runs.
+        returns: u64,
+        runs: u64,
+        /// One coordinate is within so many bits.
+        bits: u32,
+        intensities: u64,
+        /// Between points, in steps of 1e-7 s, of which some are much longer or go back.
+        pause: u64,
+    }
+
+    /// Records whose extra bytes are constant, step by step, noisy, or one below the one before.
+    fn records(n: usize, seed: u64, kind: Kind) -> Vec<u8> {
+        let (mut chance, mut time) = (Chance(seed), 1.0e8);
         let of_record = |i: usize| {
             let mut row = [0; SIZE + 5];
-            for byte in row.iter_mut().take(12).step_by(4) {
-                *byte = next();
+            for axis in 0..3 {
+                let at = chance.below(1 << kind.bits) as i32 - (1_i64 << (kind.bits - 1)) as i32;
+                row[4 * axis..4 * axis + 4].copy_from_slice(&at.to_le_bytes());
             }
-            row[14] = 0x11;
-            row[SCANNER] = (next() & scanners) << 4;
-            row[22..30].copy_from_slice(&(i as f64 * 1e-5).to_le_bytes());
+            let intensity = (chance.below(kind.intensities) * 40_503) as u16;
+            row[12..14].copy_from_slice(&intensity.to_le_bytes());
+            row[14] = 0x11 * (1 + chance.below(kind.returns) as u8);
+            row[SCANNER] = (chance.below(kind.scanners) as u8) << 4;
+            row[20] = chance.below(kind.runs) as u8;
+            time += 1e-7
+                * (chance.below(kind.pause) as f64 - 1.0)
+                * match chance.below(500) {
+                    0 => 1e4,
+                    1 => 1e6,
+                    2 => -300.0,
+                    _ => 1.0,
+                };
+            row[22..30].copy_from_slice(&f64::to_le_bytes(time));
             row[SIZE] = 7;
             row[SIZE + 1] = (i / 50) as u8;
-            row[SIZE + 2] = next();
+            row[SIZE + 2] = chance.below(256) as u8;
             row[SIZE + 3] = 255 - i as u8;
-            row[SIZE + 4] = next() & next() & next();
+            row[SIZE + 4] = (chance.below(256) & chance.below(256)) as u8;
             row
         };
         (0..n).flat_map(of_record).collect()
     }
 
+    const PLAIN: Kind = Kind {
+        scanners: 1,
+        returns: 1,
+        runs: 1,
+        bits: 20,
+        intensities: 300,
+        pause: 60,
+    };
+
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(40))]
+        #![proptest_config(ProptestConfig::with_cases(60))]
         #[test]
-        fn a_file_has_the_bytes_that_laz_gives_it(n in 1..3000_usize, seed: u64, scanners in 0..2_u8) {
-            let records = records(n, seed, scanners);
+        fn a_file_of_single_returns_has_the_bytes_that_laz_gives_it(
+            n in 1..3000_usize,
+            seed: u64,
+            bits in 1..=32_u32,
+            intensities in 1..70_000_u64,
+            pause in 1..2000_u64,
+        ) {
+            let kind = Kind { bits, intensities, pause, ..PLAIN };
+            let records = records(n, seed, kind);
+            prop_assert!(ours(&records, 5) == expected(&records, 5));
+        }
+
+        #[test]
+        fn a_file_of_anything_has_the_bytes_that_laz_gives_it(
+            n in 1..2000_usize,
+            seed: u64,
+            scanners in 1..3_u64,
+            returns in 1..3_u64,
+            runs in 1..3_u64,
+            pause in prop::sample::select(vec![60, 60_000_000]),
+        ) {
+            let kind = Kind { scanners, returns, runs, pause, ..PLAIN };
+            let records = records(n, seed, kind);
             prop_assert!(ours(&records, 5) == expected(&records, 5));
         }
     }
 
     #[test]
     fn counts_are_halved_as_those_of_laz() {
-        let records = records(60_000, 3, 0);
+        let records = records(60_000, 3, PLAIN);
         let chunks = Chunks::new(5, false).unwrap();
         let all = layered(&chunks.items[1], records.chunks_exact(chunks.size())).unwrap();
+        assert!(returns::layers(&records, chunks.size()).is_some());
         assert!(chunks.compressed(&records).unwrap() == all);
     }
 
@@ -256,7 +327,7 @@ mod tests {
 
     #[test]
     fn records_without_extra_bytes_are_compressed_too() {
-        let rows = records(900, 9, 0);
+        let rows = records(900, 9, PLAIN);
         let bare: Vec<u8> = rows
             .chunks_exact(SIZE + 5)
             .flat_map(|row| row[..SIZE].to_vec())

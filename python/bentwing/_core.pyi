@@ -515,6 +515,28 @@ class Samples:
         (N, 3) float64, m, map frame; times beyond the samples take the first or last pose
         """
 
+    def place_shots(
+        self,
+        points: NDArray[np.float64],
+        stamps: NDArray[np.float64],
+        angles: NDArray[np.float64] | None,
+        globals: Globals,
+        *,
+        threads: int = 0,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float32], NDArray[np.float64]]:
+        """Place lidar points in the map, with the beams that measured them.
+
+        Parameters
+        ----------
+        points, stamps, angles, globals : as of `place`
+
+        Returns
+        -------
+        points : (N, 3) float64, m, map frame
+        beams : (N, 3) float32, unit directions from the lidar, map frame
+        lengths : (N,) float64, m
+        """
+
 @final
 class Surfels:
     """Surfels of a stretch of time, in the lidar frame at their mean stamps.

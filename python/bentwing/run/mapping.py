@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bentwing.base.clock import NS_PER_S
+from bentwing.base.memory import give_back
 from bentwing.base.trajectory import Trajectory
 from bentwing.evaluate.revisits import revisit_consistency
 from bentwing.map.chunk import untimed
@@ -108,6 +109,7 @@ def write_map(
         for chunk in kept:
             timed = with_own_times(chunk, late)
             writer.write(replace(timed, points=_projected(chunk.points, placed)))
+    give_back()  # what is compared now is as much again
     counts["map.written"] = writer.n_points
     points = sample.points
     revisits = revisit_consistency(points, sample.times) if len(points) else None

@@ -109,7 +109,7 @@ class LazCompressor:
 
     Parameters
     ----------
-    point_format : 0 to 10, of the LAS specification
+    point_format : of the LAS specification; 6
     n_extra_bytes : size of the extra dimensions of a point
     own_chunks : whether chunks are as large as `compress_chunks` says, else all are of one size
     """
@@ -513,6 +513,28 @@ class Samples:
         Returns
         -------
         (N, 3) float64, m, map frame; times beyond the samples take the first or last pose
+        """
+
+    def place_shots(
+        self,
+        points: NDArray[np.float64],
+        stamps: NDArray[np.float64],
+        angles: NDArray[np.float64] | None,
+        globals: Globals,
+        *,
+        threads: int = 0,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float32], NDArray[np.float64]]:
+        """Place lidar points in the map, with the beams that measured them.
+
+        Parameters
+        ----------
+        points, stamps, angles, globals : as of `place`
+
+        Returns
+        -------
+        points : (N, 3) float64, m, map frame
+        beams : (N, 3) float32, unit directions from the lidar, map frame
+        lengths : (N,) float64, m
         """
 
 @final

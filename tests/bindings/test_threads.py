@@ -75,6 +75,20 @@ def test_placed_points_are_the_same_with_any_number_of_threads(flight, samples, 
     assert placed[0].tobytes() == placed[1].tobytes()
 
 
+@pytest.mark.parametrize("threads", COUNTS)
+def test_shots_are_placed_points_with_the_beams_from_where_the_lidar_was(
+    flight, samples, states, threads
+):
+    measured = (flight.points, flight.stamps, None, states())
+    points, beams, lengths = samples.place_shots(*measured, threads=threads)
+    assert points.tobytes() == samples.place(*measured, threads=1).tobytes()
+    assert beams.tobytes() == samples.place_shots(*measured, threads=1)[1].tobytes()
+    nowhere = np.zeros_like(flight.points)
+    origins = samples.place(nowhere, flight.stamps, None, states(), threads=1)
+    np.testing.assert_allclose(points - beams * lengths[:, None], origins, rtol=0, atol=1e-5)
+    np.testing.assert_allclose(lengths, np.linalg.norm(flight.points, axis=1), rtol=1e-15)
+
+
 def test_calls_from_several_threads_at_once_do_not_disturb_each_other(register):
     results = [None] * 3
 

@@ -180,10 +180,10 @@ pub(crate) fn xyzw(q: &UnitQuaternion<f64>) -> [f64; 4] {
 }
 
 /// An (N, D) array from rows.
-pub(crate) fn to_array2<'py, const D: usize>(
+pub(crate) fn to_array2<'py, T: numpy::Element + Copy, const D: usize>(
     py: Python<'py>,
-    rows: &[[f64; D]],
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    rows: &[[T; D]],
+) -> PyResult<Bound<'py, PyArray2<T>>> {
     use numpy::PyArrayMethods;
     rows.as_flattened().to_pyarray(py).reshape([rows.len(), D])
 }

@@ -5,7 +5,8 @@ use std::fs::{File, OpenOptions};
 use std::io::{Seek, SeekFrom};
 use std::path::PathBuf;
 
-use ::laz::{LasZipError, LazItemRecordBuilder, LazVlr, LazVlrBuilder, ParLasZipCompressor};
+use ::laz::LasZipError;
+use bentwing_las::{Appended, Chunks};
 use numpy::PyReadonlyArray1;
 use pyo3::exceptions::{PyOSError, PyValueError};
 use pyo3::prelude::*;
@@ -13,17 +14,16 @@ use pyo3::types::PyBytes;
 
 use crate::errors::in_pool;
 
-/// LAZ chunks that are compressed at a time. Only whole ones are compressed beside each other.
-const CHUNKS: usize = 4;
+/// LAZ chunks that are compressed at a time.
+const TOGETHER: usize = 4;
 
 /// Appends compressed points to a file whose header is written already.
 #[pyclass(module = "bentwing._core")]
 pub(crate) struct LazCompressor {
-    vlr: LazVlr,
-    point_size: usize,
+    chunks: Chunks,
     /// Points that do not fill their chunks yet.
     waiting: Vec<u8>,
-    file: Option<ParLasZipCompressor<File>>,
+    file: Option<Appended<File>>,
 }
 
 #[pymethods]
@@ -31,18 +31,13 @@ impl LazCompressor {
     #[new]
     #[pyo3(signature = (point_format, n_extra_bytes, *, own_chunks=false))]
     fn new(point_format: u8, n_extra_bytes: u16, own_chunks: bool) -> PyResult<Self> {
-        let items = LazItemRecordBuilder::default_for_point_format_id(point_format, n_extra_bytes);
-        let items = items.map_err(|e| PyValueError::new_err(format!("point_format: {e}")))?;
-        let builder = LazVlrBuilder::new(items);
-        let vlr = if own_chunks {
-            builder.with_variable_chunk_size().build()
-        } else {
-            builder.build()
-        };
-        let point_size = vlr.items_size() as usize;
+        if point_format != 6 {
+            let message = format!("point_format: expected 6, got {point_format}");
+            return Err(PyValueError::new_err(message));
+        }
+        let chunks = Chunks::new(n_extra_bytes, own_chunks);
         Ok(Self {
-            vlr,
-            point_size,
+            chunks: chunks.map_err(|e| PyValueError::new_err(format!("n_extra_bytes: {e}")))?,
             waiting: Vec::new(),
             file: None,
         })
@@ -50,8 +45,7 @@ impl LazCompressor {
 
     /// The record that the header of the file must announce.
     fn record_data<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
-        let mut data = Vec::new();
-        self.vlr.write_to(&mut data)?;
+        let data = self.chunks.announced().map_err(os_error)?;
         Ok(PyBytes::new(py, &data))
     }
 
@@ -59,8 +53,8 @@ impl LazCompressor {
     fn begin(&mut self, path: PathBuf, offset: u64) -> PyResult<()> {
         let mut file = OpenOptions::new().write(true).open(path)?;
         file.seek(SeekFrom::Start(offset))?;
-        let compressor = ParLasZipCompressor::new(file, self.vlr.clone()).map_err(os_error)?;
-        self.file = Some(compressor);
+        let appended = Appended::new(self.chunks.clone(), file).map_err(io_error)?;
+        self.file = Some(appended);
         Ok(())
     }
 
@@ -73,28 +67,29 @@ impl LazCompressor {
         threads: usize,
     ) -> PyResult<()> {
         let bytes = points.as_slice()?;
-        if self.vlr.uses_variable_size_chunks() {
+        let size = self.chunks.size();
+        let Some(n) = self.chunks.fixed() else {
             let message = "the file has chunks of its own sizes, give them to compress_chunks()";
             return Err(PyValueError::new_err(message));
-        }
-        if !bytes.len().is_multiple_of(self.point_size) {
+        };
+        if !bytes.len().is_multiple_of(size) {
             let message = format!(
-                "points: expected a multiple of {} bytes, got {}",
-                self.point_size,
+                "points: expected a multiple of {size} bytes, got {}",
                 bytes.len()
             );
             return Err(PyValueError::new_err(message));
         }
         let (file, waiting) = (begun(&mut self.file)?, &mut self.waiting);
-        let whole = CHUNKS * self.vlr.chunk_size() as usize * self.point_size;
+        let whole = TOGETHER * n * size;
         let work = || {
             waiting.extend_from_slice(bytes);
-            let n = waiting.len() / whole * whole;
-            file.compress_many(&waiting[..n])?;
-            waiting.drain(..n);
-            Ok::<(), std::io::Error>(())
+            let end = waiting.len() / whole * whole;
+            let parts: Vec<&[u8]> = waiting[..end].chunks(n * size).collect();
+            file.append(&parts)?;
+            waiting.drain(..end);
+            Ok(())
         };
-        in_pool(py, threads, work)?.map_err(io_error)
+        in_pool(py, threads, work)?.map_err(os_error)
     }
 
     /// Appends points as one chunk for each of `counts`, beside each other.
@@ -107,48 +102,50 @@ impl LazCompressor {
         threads: usize,
     ) -> PyResult<()> {
         let bytes = points.as_slice()?;
-        if !self.vlr.uses_variable_size_chunks() {
+        if self.chunks.fixed().is_some() {
             let message = "the file has chunks of one size, give the points to compress()";
             return Err(PyValueError::new_err(message));
         }
-        let n_points = bytes.len() / self.point_size;
+        let size = self.chunks.size();
+        let n_points = bytes.len() / size;
         let announced = counts
             .iter()
             .try_fold(0_usize, |n, count| n.checked_add(*count));
-        let is_whole = bytes.len().is_multiple_of(self.point_size);
+        let is_whole = bytes.len().is_multiple_of(size);
         if counts.contains(&0) || announced != Some(n_points) || !is_whole {
             let message = format!("counts: expected numbers above 0 of {n_points} points in all");
             return Err(PyValueError::new_err(message));
         }
         let mut rest = bytes;
-        let mut chunks = Vec::with_capacity(counts.len());
+        let mut parts = Vec::with_capacity(counts.len());
         for count in counts {
-            let (chunk, behind) = rest.split_at(count * self.point_size);
-            chunks.push(chunk);
+            let (part, behind) = rest.split_at(count * size);
+            parts.push(part);
             rest = behind;
         }
         let file = begun(&mut self.file)?;
-        in_pool(py, threads, || file.compress_chunks(chunks))?.map_err(io_error)
+        in_pool(py, threads, || file.append(&parts))?.map_err(os_error)
     }
 
     /// Writes what is held back and the table of chunks.
     #[pyo3(signature = (*, threads=0))]
     fn finish(&mut self, py: Python<'_>, threads: usize) -> PyResult<()> {
-        let (file, waiting) = (begun(&mut self.file)?, &mut self.waiting);
-        let work = || {
-            if !waiting.is_empty() {
-                file.compress_many(waiting).map_err(LasZipError::IoError)?;
-            }
-            file.done()
+        begun(&mut self.file)?;
+        let (Some(mut file), waiting) = (self.file.take(), std::mem::take(&mut self.waiting))
+        else {
+            return Ok(());
         };
-        in_pool(py, threads, work)?.map_err(os_error)?;
-        self.waiting.clear();
-        self.file = None;
-        Ok(())
+        let chunk = self.chunks.fixed().unwrap_or(1) * self.chunks.size();
+        let work = || {
+            let parts: Vec<&[u8]> = waiting.chunks(chunk).collect();
+            file.append(&parts)?;
+            file.finish()
+        };
+        in_pool(py, threads, work)?.map_err(os_error)
     }
 }
 
-fn begun(file: &mut Option<ParLasZipCompressor<File>>) -> PyResult<&mut ParLasZipCompressor<File>> {
+fn begun(file: &mut Option<Appended<File>>) -> PyResult<&mut Appended<File>> {
     let missing = || PyValueError::new_err("begin() was not called, or finish() was");
     file.as_mut().ok_or_else(missing)
 }

@@ -4,7 +4,7 @@
 use bentwing_registration::{N_GLOBALS, PoseResponse, UNMOVED, follow};
 use bentwing_trajectory::{Imu as RustImu, Trajectory, extend_constant_velocity, extend_inertial};
 use numpy::{
-    PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2,
+    IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2,
     PyReadonlyArray3, PyUntypedArrayMethods, ToPyArray,
 };
 use pyo3::exceptions::PyValueError;
@@ -28,6 +28,13 @@ type SamplesArguments<'py> = (
     Bound<'py, PyArray2<f64>>,
     Bound<'py, PyArray2<f64>>,
     Bound<'py, PyArray3<f64>>,
+);
+
+/// Points, beams and lengths.
+type ShotArrays<'py> = (
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray2<f32>>,
+    Bound<'py, PyArray1<f64>>,
 );
 
 impl Samples {
@@ -223,6 +230,30 @@ impl Samples {
             bentwing_surfels::place_points(points, stamps, angles, &self.0, head)
         })?;
         to_array2(py, &placed)
+    }
+
+    /// Lidar points placed in the map (N, 3), the unit directions of their beams there (N, 3) and the
+    /// beams' lengths (N,), m.
+    #[pyo3(signature = (points, stamps, angles, globals, *, threads = 0))]
+    fn place_shots<'py>(
+        &self,
+        py: Python<'py>,
+        points: PyReadonlyArray2<'py, f64>,
+        stamps: PyReadonlyArray1<'py, f64>,
+        angles: Option<PyReadonlyArray1<'py, f64>>,
+        globals: &Globals,
+        threads: usize,
+    ) -> PyResult<ShotArrays<'py>> {
+        let points = finite_rows("points", &points)?;
+        let stamps = times("stamps", &stamps, points.len())?;
+        let head = &globals.0.head;
+        let angles = crate::arrays::angles(angles.as_ref(), points.len(), head.motor.is_some())?;
+        let shots = in_pool(py, threads, || {
+            bentwing_surfels::place_shots(points, stamps, angles, &self.0, head)
+        })?;
+        let points = to_array2(py, &shots.points)?;
+        let beams = to_array2(py, &shots.beams)?;
+        Ok((points, beams, shots.lengths.into_pyarray(py)))
     }
 }
 

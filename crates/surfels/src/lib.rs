@@ -8,5 +8,5 @@ mod place;
 mod surfel;
 
 pub use extract::{Points, Settings, extract};
-pub use place::place_points;
+pub use place::{PlacedShots, place_points, place_shots};
 pub use surfel::SurfelSet;

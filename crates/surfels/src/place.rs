@@ -30,6 +30,52 @@ pub fn place_points(
     placed
 }
 
+/// Returns in the map.
+#[derive(Clone, Debug)]
+pub struct PlacedShots {
+    /// m.
+    pub points: Vec<[f64; 3]>,
+    /// Unit directions from the lidar to the points.
+    pub beams: Vec<[f32; 3]>,
+    /// m, as they were given.
+    pub lengths: Vec<f64>,
+}
+
+/// Shorter beams have no direction, m.
+const SHORTEST: f32 = 1e-6;
+
+/// Lidar points in the map, as [`place_points`] has them, with the beams that measured them.
+pub fn place_shots(
+    points: &[[f64; 3]],
+    times: &[f64],
+    angles: &[f64],
+    trajectory: &Trajectory,
+    head: &Head,
+) -> PlacedShots {
+    let placer = Placer::new(trajectory, head);
+    let mut placed = vec![[0.0; 3]; points.len()];
+    let mut origins = placed.clone();
+    placer.place(points, times, angles, &mut placed);
+    placer.place(&vec![[0.0; 3]; points.len()], times, angles, &mut origins);
+    let length = |p: &[f64; 3]| (p[0] * p[0] + p[1] * p[1] + p[2] * p[2]).sqrt();
+    let lengths: Vec<f64> = points.par_iter().with_min_len(CHUNK).map(length).collect();
+    let beams = placed
+        .par_iter()
+        .zip(&origins)
+        .zip(&lengths)
+        .with_min_len(CHUNK)
+        .map(|((p, o), &length)| {
+            let length = f64::from((length as f32).max(SHORTEST));
+            [0, 1, 2].map(|a| ((p[a] - o[a]) / length) as f32)
+        })
+        .collect();
+    PlacedShots {
+        points: placed,
+        beams,
+        lengths,
+    }
+}
+
 /// Places points with one trajectory and head.
 pub(crate) struct Placer<'a> {
     trajectory: &'a Trajectory,

@@ -15,7 +15,7 @@ from bentwing.base.settings import Settings
 from bentwing.map.chunk import MapChunk
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Generator, Iterable
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -55,7 +55,7 @@ def clean(
     counts: dict[str, int] | None = None,
     record: dict[str, Any] | None = None,
     threads: int | None = None,
-) -> Iterator[MapChunk]:
+) -> Generator[MapChunk, None, None]:
     """Give every point its incidence and local thickness, and leave out what is not there.
 
     All chunks pass once before the first one comes out; meanwhile they are on the disk.

@@ -63,18 +63,17 @@ def project(
         batch = _placeable(batch, trajectory, segments, calibration, counts)
         if len(batch.times):
             angles = batch.angles if turned else None
-            lengths = _lengths(batch.points)
+            points, beams, lengths = samples.place_shots(
+                batch.points, batch.times, angles, slow, threads=threads or 0
+            )
             ranges = lengths.astype(np.float32)
-            at = np.zeros_like(batch.points)
-            origins = samples.place(at, batch.times, angles, slow, threads=threads or 0)
-            points = samples.place(batch.points, batch.times, angles, slow, threads=threads or 0)
             yield MapChunk(
                 points,
                 calibration.measured(batch.times),
                 ranges,
                 batch.intensity,
                 batch.ring,
-                _directions(points - origins, ranges),
+                beams,
                 mixed_pixels(batch.points, lengths, batch.times, batch.ring),
                 run_id=np.zeros(len(ranges), np.uint16),
             )
@@ -108,16 +107,6 @@ def _placeable(
     keep = covered & finite
     counts["map.points"] += int(np.count_nonzero(keep))
     return batch if keep.all() else batch.where(keep)
-
-
-def _lengths(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    x, y, z = points.T  # along rows of three np.linalg.norm takes several times longer
-    lengths: NDArray[np.float64] = np.sqrt(x * x + y * y + z * z)
-    return lengths
-
-
-def _directions(offsets: NDArray[np.float64], lengths: NDArray[np.float32]) -> NDArray[np.float32]:
-    return (offsets / np.maximum(lengths, np.float32(1e-6))[:, None]).astype(np.float32)
 
 
 def _gathered(batches: Iterable[Batch]) -> Iterator[LidarBatch]:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -11,11 +11,13 @@ import numpy as np
 
 from bentwing import _core
 from bentwing.base.array_spool import ArraySpool, columns_of
+from bentwing.base.memory import give_back
 from bentwing.map.chunk import MapChunk
 from bentwing.map.slabs import Extent
+from bentwing.recording.preprocess.read_ahead import read_ahead
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Generator, Iterable, Iterator
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -32,6 +34,7 @@ MOST_NOISE = 0.03  # m, of a range; what looks noisier is the shape of things
 PASS_LENGTH = 0.25
 MOST_POINTS = 4_000_000  # that are looked at together, about 100 bytes each
 _HELD = 32_000_000  # bytes of moves that need no file
+_PARTS_AHEAD = 8  # chosen while those before them go to the disk
 _NEEDED = ("points", "beams", "ranges", "times")
 _STEP = 1e-4  # m, of the histograms of moves and standard deviations
 _N_STEPS = 1000
@@ -44,7 +47,7 @@ def refine(
     counts: dict[str, int] | None = None,
     record: dict[str, Any] | None = None,
     threads: int | None = None,
-) -> Iterator[MapChunk]:
+) -> Generator[MapChunk, None, None]:
     """Move every point along its own beam to where it most probably is.
 
     All chunks pass once before the first one comes out; meanwhile they are on the disk. A large map is
@@ -78,6 +81,7 @@ def refine(
         noise: _core.RangeNoise | None = None
         # Of the largest group the noise is learnt.
         for number in sorted(range(len(groups)), key=lambda number: -sum(sizes[number])):
+            give_back()  # of the group before
             found = _sample(groups[number]).refine(noise=noise, threads=threads or 0)
             groups[number].close()
             noise, shift, sigma = found or _unmoved(noise, sum(sizes[number]))
@@ -98,12 +102,20 @@ def refine(
 def _distribute(spool: ArraySpool, slabs: Slabs, groups: list[ArraySpool]) -> list[list[int]]:
     """Give each group its points; return how many of each chunk are the group's own."""
     sizes: list[list[int]] = [[] for _ in groups]
+    with closing(read_ahead(_parts(spool, slabs), _PARTS_AHEAD)) as parts:
+        for number, columns in parts:
+            groups[number].add(columns)
+            sizes[number].append(int(np.count_nonzero(columns["own"])))
+    return sizes
+
+
+def _parts(
+    spool: ArraySpool, slabs: Slabs
+) -> Generator[tuple[int, dict[str, NDArray[Any]]], None, None]:
     for columns in spool.tables():
         for part in slabs.parts(columns["points"]):
             chosen = {name: columns[name].take(part.rows, axis=0) for name in _NEEDED}
-            groups[part.number].add({**chosen, "own": part.own})
-            sizes[part.number].append(int(np.count_nonzero(part.own)))
-    return sizes
+            yield part.number, {**chosen, "own": part.own}
 
 
 def _sample(group: ArraySpool) -> _core.SurfaceSample:

@@ -52,7 +52,7 @@ class MapSample:
     def add(self, chunk: MapChunk) -> None:
         """Take the share of a chunk that belongs to the sample."""
         chosen = slice(self._next, None, self._step)
-        taken = chunk.measured[chosen]
+        taken = chunk.where(chosen).measured
         self._next += len(taken) * self._step - len(chunk)
         self._points.append(taken.copy())
         self._times.append(chunk.times[chosen].copy())

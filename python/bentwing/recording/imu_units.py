@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from bentwing.recording.batches import Batch
     from bentwing.recording.sections.imu import AccelUnit, ImuUnits
 
+    Samples = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
+
 CHECKED = 60.0  # s of the recording's beginning; more would not change the judgement
 MIN_SAMPLES = 20
 QUIET, NO_GRAVITY = 1.0, 0.5  # s; of the median length
@@ -45,16 +47,9 @@ EXPLAINS, BETTER = 0.5, 0.25
 _AS_THEY_ARE = np.eye(3)
 
 
-def collect(
-    batches: Iterable[Batch], seconds: float = CHECKED
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def collect(batches: Iterable[Batch], seconds: float = CHECKED) -> Samples:
     """Return times (M,), gyro (M, 3) and accel (M, 3) of the first seconds."""
-    parts: list[ImuBatch] = []
-    for batch in batches:
-        if isinstance(batch, ImuBatch):
-            parts.append(batch)
-            if batch.times[-1] - parts[0].times[0] >= seconds:
-                break
+    parts = beginning(batches, seconds)
     if not parts:
         return np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3))
     return (
@@ -62,6 +57,17 @@ def collect(
         np.concatenate([part.gyro for part in parts]),
         np.concatenate([part.accel for part in parts]),
     )
+
+
+def beginning(batches: Iterable[Batch], seconds: float) -> list[ImuBatch]:
+    """Return the batches of the first seconds."""
+    parts: list[ImuBatch] = []
+    for batch in batches:
+        if isinstance(batch, ImuBatch):
+            parts.append(batch)
+            if batch.times[-1] - parts[0].times[0] >= seconds:
+                break
+    return parts
 
 
 def problems(

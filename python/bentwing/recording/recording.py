@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
     from typing_extensions import Self
 
-    from bentwing.recording.batches import Batch
+    from bentwing.recording.batches import Batch, ImuBatch
     from bentwing.recording.clocks.findings import ClockFindings
     from bentwing.recording.containers.scanned import TopicInfo
     from bentwing.recording.payload import PayloadLike
@@ -79,6 +79,7 @@ class Recording:
         self._source = open_source(self.paths)
         self._streams: dict[str, Stream] = {}
         self._opening_warnings: list[str] = []
+        self._first_imu: tuple[float, list[ImuBatch]] = (0.0, [])
         try:
             self._survey()
         except BaseException:
@@ -144,7 +145,8 @@ class Recording:
             self._check_imu()
 
     def _check_imu(self) -> None:
-        samples = imu_units.collect(self.imu_batches())
+        samples = self.first_imu(imu_units.CHECKED)
+        self._first_imu = (0.0, [])  # nobody asks again
         units = None if self.payload.imu is None else self.payload.imu.units
         if found := imu_units.problems(*samples, units):
             msg = f"{self.imu_topic}: {'; '.join(found)}"
@@ -178,6 +180,14 @@ class Recording:
     def imu_batches(self) -> Iterator[Batch]:
         """Yield the IMU's samples alone, in a pass of their own that leaves the counts as is."""
         return self._alone("imu")
+
+    def first_imu(self, seconds: float) -> imu_units.Samples:
+        """Return times (M,), gyro (M, 3) and accel (M, 3) of the first seconds, read once until `check`."""
+        known, batches = self._first_imu
+        if seconds > known:
+            batches = imu_units.beginning(self.imu_batches(), seconds)
+            self._first_imu = (seconds, batches)
+        return imu_units.collect(batches, seconds)
 
     def encoder_batches(self) -> Iterator[Batch]:
         """Yield the encoder's angles alone, in a pass of their own that leaves the counts as is."""

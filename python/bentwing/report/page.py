@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any
 
 from bentwing.base.atomic import write_text
@@ -55,12 +56,15 @@ def write_report(
     cost : what run.json will say of time and memory, asked once all is drawn; default: what it says now
     texts : words of the language
     """
-    drawn = Drawn.of(run_json, trajectory, map_sample, texts)
+    with ThreadPoolExecutor(1) as beside:
+        agreement = beside.submit(evidence.agreement_section, *map_sample, revisits, texts)
+        drawn = Drawn.of(run_json, trajectory, map_sample, texts)
+        in_space = evidence.map_section(drawn)
     parts = [
         cover(drawn),
-        evidence.map_section(drawn),
+        in_space,
         evidence.coverage_section(drawn),
-        evidence.agreement_section(*map_sample, revisits, texts),
+        agreement.result(),
         localization_section(drawn, change),
         on_earth_section(run_json.get("georeference")),
         merging_section(run_json.get("merging")),

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 
 from bentwing.base.atomic import write_bytes
-from bentwing.base.voxels import by_key
 from bentwing.report.colours import HEIGHT, colour
 from bentwing.report.occlusion import ambient
 
@@ -238,10 +237,8 @@ def _front_points(
     is_inside = (row >= 0) & (row < shape[0]) & (column >= 0) & (column < shape[1])
     pixel = row.astype(np.intp) * shape[1] + column.astype(np.intp)
     pixel[~is_inside] = outside
-    order, starts = by_key(pixel)
     nearest = np.full(outside + 1, -np.inf)
-    if len(order):
-        nearest[pixel[order[starts]]] = np.maximum.reduceat(toward[order], starts)
+    np.maximum.at(nearest, pixel, toward)
     index = np.flatnonzero(toward == nearest[pixel])
     front = np.full(outside + 1, -1, np.intp)
     front[pixel[index]] = index

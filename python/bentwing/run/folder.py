@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from bentwing.base.atomic import write_text
 from bentwing.base.errors import InputError
+from bentwing.base.memory import give_back
 from bentwing.base.provenance import describe_input, files_of
 from bentwing.base.regular_file import resolved
 from bentwing.base.result_folder import reason_of
@@ -112,6 +113,7 @@ class RunFolder:
         try:
             yield
         finally:
+            give_back()  # else each stage takes the memory of all those before it, too
             self.record.add_seconds(name, time.monotonic() - started)
 
     def add_inputs(self, paths: Iterable[Path]) -> None:

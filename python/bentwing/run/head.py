@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bentwing.base.errors import RecordingError
+from bentwing.base.memory import give_back
 from bentwing.calibrate.inspection import judge
 from bentwing.recording import Payload, Recording
 from bentwing.recording.preprocess import KeptBatches, RecordingPart
@@ -122,9 +123,11 @@ class Head:
 
         self._progress.note("looking for the set-up of the sensor head in the recording")
         settings = self.settings
-        return find_set_up(
+        found = find_set_up(
             self.paths, settings.payload, settings.threads, after=settings.start or 0.0
         )
+        give_back()  # it has held all returns of a stretch
+        return found
 
     def use(self, set_up: SetUp) -> None:
         """Read the recording by a set-up that was found, and say what it is."""

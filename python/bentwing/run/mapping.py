@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 from collections import Counter
-from contextlib import closing
+from contextlib import ExitStack, closing
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bentwing.base.clock import NS_PER_S
+from bentwing.base.memory import give_back
 from bentwing.base.trajectory import Trajectory
 from bentwing.evaluate.revisits import revisit_consistency
 from bentwing.map.chunk import untimed
@@ -23,7 +24,7 @@ from bentwing.recording.preprocess.read_ahead import read_ahead
 from bentwing.run.found import WrittenMap
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Generator, Iterator, Sequence
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -36,7 +37,7 @@ if TYPE_CHECKING:
     from bentwing.run.found import Placed
     from bentwing.run.settings import MapSettings
 
-# Cleaned while those before them are compressed and written.
+# Each stage works at these while the next one works at those before them.
 _CHUNKS_AHEAD = 2
 _PAUSE = 10.0  # s between runs that are shown one after the other
 
@@ -81,31 +82,34 @@ def write_map(
     path, sample = folder.file(f"map.{settings.map_format}"), MapSample()
     counts: dict[str, int] = {}
     record: dict[str, Any] = {}
-    chunks = clean(
-        in_turn(sources, counts),
-        folder.path,
-        duration=duration,
-        settings=settings.cleaning,
-        counts=counts,
-        record=record,
-        threads=settings.threads,
-    )
-    if difference is not None:
-        chunks = difference.watch(chunks)
-    if settings.refine:
-        refined: dict[str, Any] = {}
-        record["refinement"] = refined
-        chunks = refine(
-            chunks, folder.path, counts=counts, record=refined, threads=settings.threads
+    with ExitStack() as stack:
+
+        def ahead(chunks: Generator[MapChunk, None, None]) -> Generator[MapChunk, None, None]:
+            return stack.enter_context(closing(read_ahead(chunks, _CHUNKS_AHEAD)))
+
+        chunks = clean(
+            ahead(in_turn(sources, counts)),
+            folder.path,
+            duration=duration,
+            settings=settings.cleaning,
+            counts=counts,
+            record=record,
+            threads=settings.threads,
         )
-    kept = sample.watch(thin(chunks, settings.map_spacing, counts))
-    with (
-        closing(read_ahead(kept, _CHUNKS_AHEAD)) as ahead,
-        _open(path, settings, origin_ns, placed) as writer,
-    ):
-        for chunk in ahead:
+        if difference is not None:
+            chunks = difference.watch(chunks)
+        if settings.refine:
+            refined: dict[str, Any] = {}
+            record["refinement"] = refined
+            chunks = refine(
+                ahead(chunks), folder.path, counts=counts, record=refined, threads=settings.threads
+            )
+        kept = ahead(sample.watch(thin(chunks, settings.map_spacing, counts)))
+        writer = stack.enter_context(_open(path, settings, origin_ns, placed))
+        for chunk in kept:
             timed = with_own_times(chunk, late)
             writer.write(replace(timed, points=_projected(chunk.points, placed)))
+    give_back()  # what is compared now is as much again
     counts["map.written"] = writer.n_points
     points = sample.points
     revisits = revisit_consistency(points, sample.times) if len(points) else None
@@ -155,7 +159,9 @@ def joined_trajectory(estimates: Sequence[Estimate]) -> Trajectory:
     )
 
 
-def in_turn(sources: Sequence[MapSource], counts: dict[str, int]) -> Iterator[MapChunk]:
+def in_turn(
+    sources: Sequence[MapSource], counts: dict[str, int]
+) -> Generator[MapChunk, None, None]:
     """Yield the points of all runs, with times and numbers as if the runs had followed each other."""
     offsets = follow_each_other([source.estimate for source in sources])
     total: Counter[str] = Counter()

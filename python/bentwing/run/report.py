@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -13,6 +14,7 @@ from bentwing.base.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
+    from pathlib import Path
 
     from bentwing.base.progress import Progress
     from bentwing.run.folder import RunFolder
@@ -58,17 +60,23 @@ def _write(
         trajectory = _NOWHERE if found.estimate is None else found.estimate.trajectory
     started = time.monotonic()
     points, times = found.sample.points, found.sample.times
-    if len(points):
+
+    def draw_top(path: Path) -> None:
         overhead = overhead_points(points, times, trajectory)
         seen = points[~overhead] if overhead.any() else points
-        write_png(folder.file("map_top.png"), render_top(seen))
-    write_report(
-        folder.file("report.html"),
-        run_json={**folder.described(), "complete": complete},
-        trajectory=trajectory,
-        map_sample=(points, times),
-        revisits=None if found.map is None else found.map.revisits,
-        change=None if found.map is None else found.map.change,
-        spin=found.spin.series,
-        cost=lambda: folder.record.settle(time.monotonic() - started),
-    )
+        write_png(path, render_top(seen))
+
+    with ThreadPoolExecutor(1) as beside:
+        top = beside.submit(draw_top, folder.file("map_top.png")) if len(points) else None
+        write_report(
+            folder.file("report.html"),
+            run_json={**folder.described(), "complete": complete},
+            trajectory=trajectory,
+            map_sample=(points, times),
+            revisits=None if found.map is None else found.map.revisits,
+            change=None if found.map is None else found.map.change,
+            spin=found.spin.series,
+            cost=lambda: folder.record.settle(time.monotonic() - started),
+        )
+        if top is not None:
+            top.result()

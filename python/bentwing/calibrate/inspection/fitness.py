@@ -73,7 +73,7 @@ def judge(recording: Recording, *, has_payload: bool) -> Judgement:
     can_be_level = is_planar(recording.lidar_type)
     can_be_level &= recording.encoder_topic is None
     seconds = np.inf if can_be_level else imu_units.CHECKED
-    imu = _Imu(*imu_units.collect(recording.imu_batches(), seconds))
+    imu = _Imu(*recording.first_imu(seconds))
     # The mount comes first: what follows takes the frames as it says.
     defects = _time_defects(recording) + recording.clock_problems()
     defects += _mount_defects(recording, has_payload=has_payload)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bentwing.base import geometry
+from bentwing.base.memory import give_back
 from bentwing.base.mount import MotorMount
 from bentwing.base.value import Value
 from bentwing.odometry.core_states import core_globals, core_samples
@@ -135,7 +136,11 @@ def sample_shots(
     for batch in held:
         chosen.append(batch.where(slice(-passed % every, None, every)))
         passed += len(batch.times)
-    return _placed(LidarBatch.joined(chosen), estimate, table)
+    few = LidarBatch.joined(chosen)
+    held.clear()
+    chosen.clear()
+    give_back()  # of all others
+    return _placed(few, estimate, table)
 
 
 def _span(estimate: Estimate) -> tuple[float, float]:

@@ -12,7 +12,7 @@ from bentwing.closing.places import FreeSpace, positions_at, seen_through
 from bentwing.map.change import Change
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Generator, Iterable
 
     from numpy.typing import NDArray
 
@@ -122,7 +122,7 @@ class Difference:
         self._seen = VoxelSet()
         self._new: list[NDArray[np.float64]] = []
 
-    def watch(self, chunks: Iterable[MapChunk]) -> Iterator[MapChunk]:
+    def watch(self, chunks: Iterable[MapChunk]) -> Generator[MapChunk, None, None]:
         """Pass a stream of chunks on unchanged, comparing it with the map."""
         for chunk in chunks:
             self._compare(chunk.points, positions_at(self._trajectory, chunk.times))

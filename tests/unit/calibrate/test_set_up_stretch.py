@@ -15,15 +15,30 @@ FIRST, SECOND = 10.0, 40.0  # s, of two motions of 8 s
 
 
 @pytest.fixture
-def recording(tmp_path, ros1):
-    """A head that moves twice, and rests in between."""
+def recorded(tmp_path, ros1):
+    """Return a maker of a recording of a head that moves twice, and rests in between."""
+
+    def make(*gaps):
+        path = ros1.write(tmp_path / "a.bag", entries(ros1, gaps))
+        return Recording([path], PAYLOAD, strict=False)
+
+    return make
+
+
+def entries(ros1, gaps):
+    """Messages in the order of their times, but for those in gaps, s."""
     entries = []
     for t in np.arange(0.0, 60.0, 0.02):
         moves = FIRST <= t < FIRST + 8 or SECOND <= t < SECOND + 8
         entries.append(("/imu", t, ros1.imu(t, [0.0, 0.5 * moves * np.sin(5 * t), 0.0])))
     entries += [("/scan", t, ros1.scan(t)) for t in np.arange(0.0, 60.0, 0.1)]
-    path = ros1.write(tmp_path / "a.bag", sorted(entries, key=lambda entry: entry[1]))
-    with Recording([path], PAYLOAD, strict=False) as opened:
+    kept = (e for e in entries if not any(start < e[1] < stop for start, stop in gaps))
+    return sorted(kept, key=lambda entry: entry[1])
+
+
+@pytest.fixture
+def recording(recorded):
+    with recorded() as opened:
         yield opened
 
 
@@ -48,3 +63,20 @@ def test_another_offset_of_the_imus_clock_moves_its_samples(recording):
     # The offset is that of the recording, not one more.
     again = later.read_as(edits.with_imu(PAYLOAD, clock_offset=2.0))
     np.testing.assert_array_equal(again.imu.times, later.imu.times)
+
+
+@pytest.mark.parametrize(
+    ("gaps", "start", "stop"),
+    [
+        ([(20.0, 21.0)], FIRST - BEFORE_MOTION, 20.0),
+        ([(10.0, 11.5)], 11.5, 11.5 - BEFORE_MOTION + LENGTH),
+        ([(10.0, 11.0), (24.0, 25.0)], 11.0, 24.0),
+        ([(14.0, 14.2)], FIRST - BEFORE_MOTION, FIRST - BEFORE_MOTION + LENGTH),
+    ],
+)
+def test_it_is_the_part_before_a_gap_or_the_longest_between_gaps(recorded, gaps, start, stop):
+    with recorded(*gaps) as recording:
+        stretch = read_stretch(recording)
+    for times in (stretch.lidar.times, stretch.imu.times):
+        assert times[0] == pytest.approx(start, abs=0.3)
+        assert times[-1] == pytest.approx(stop, abs=0.3)

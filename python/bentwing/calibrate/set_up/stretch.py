@@ -27,6 +27,8 @@ SEARCHED = 600.0  # s in which motion is looked for
 MOVING = 0.15  # rad/s away from the first half second
 MOST_POINTS = 100_000  # a second; more would only take time
 AROUND = 0.5  # s of the IMU and the encoder before and after a part
+GAP = 0.5  # s; what was recorded on both sides of a longer one is not compared with each other
+ENOUGH = 10.0  # s up to a gap
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,9 +139,32 @@ def read_stretch(recording: Recording, after: float = 0.0) -> Stretch:
         thinning.thinned(batch) if isinstance(batch, LidarBatch) else batch
         for batch in recording.batches(start or None, LENGTH)
     ]
-    return Stretch(
+    whole = Stretch(
         tuple(batch for batch in batches if len(batch.times)), _imu_offset(recording.payload)
     )
+    return _without_gaps(whole)
+
+
+def _without_gaps(whole: Stretch) -> Stretch:
+    """Return the part before the first gap if that is enough, else the longest part between gaps."""
+    starts, ends = zip(
+        *(_gaps(times) for times in (whole.lidar.times, whole.imu.times)), strict=True
+    )
+    if not len(whole.lidar.times) or not sum(map(len, starts)):
+        return whole
+    order = np.argsort(np.concatenate(starts))
+    stops, resumes = (np.concatenate(sides)[order] for sides in (starts, ends))
+    first, last = whole.lidar.times[0], whole.lidar.times[-1]
+    parts = list(zip([first, *resumes], [*stops, last], strict=True))
+    lengths = [stop - start for start, stop in parts]
+    chosen = 0 if lengths[0] >= ENOUGH else int(np.argmax(lengths))
+    return whole.part(*parts[chosen])
+
+
+def _gaps(times: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return beginnings and ends (K,), s, of what is missing of times (N,)."""
+    is_gap = np.diff(times) > GAP
+    return times[:-1][is_gap], times[1:][is_gap]
 
 
 def _imu_offset(payload: Payload) -> float:

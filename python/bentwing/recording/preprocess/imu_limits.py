@@ -123,7 +123,7 @@ class _End:
                 self._longest = np.maximum(self._longest, self._run)
         else:
             self._run[:] = 0.0
-        return at_end
+        return np.asarray(at_end)
 
     def limits(self, runs: Array, period: float) -> Mask:
         """Return which axes (6,) have stayed there for so many samples, but not too long to be bridged."""

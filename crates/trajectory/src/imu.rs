@@ -3,14 +3,11 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::limits::AtLimit;
+use crate::limits::{AtLimit, MAX_BRIDGE};
 use crate::{Trajectory, so3};
 
 /// Samples further apart than this, s, are a gap: nothing is said about the time between them.
 const MAX_GAP: f64 = 0.05;
-
-/// Across a gap of at most this, s, the motion is guessed better by both its ends than by the first.
-pub(crate) const MAX_BRIDGE: f64 = 0.25;
 
 /// Inertial samples in time order, with the running integral of the gyro.
 #[derive(Clone, Debug)]

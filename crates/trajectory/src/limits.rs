@@ -5,7 +5,8 @@ use std::ops::Range;
 
 use nalgebra::{Matrix5, Vector3, Vector5};
 
-use crate::imu::MAX_BRIDGE;
+/// Across a gap of at most this, s, the motion is guessed better by both its ends than by the first.
+pub(crate) const MAX_BRIDGE: f64 = 0.25;
 
 /// Samples on each side of a stretch that a quartic is laid through, at least, and half of which are
 /// beside the limit.

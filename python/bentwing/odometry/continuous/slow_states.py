@@ -190,22 +190,14 @@ class SlowStatePrior:
         self._information += rows.T @ rows / sigma**2
         self._offset[:] = np.linalg.solve(self._information, before @ self._offset)
 
-    def discounted(
-        self, covariance: NDArray[np.float64], share: float = MATCH_INDEPENDENCE
-    ) -> NDArray[np.float64]:
-        """Return a covariance (57, 57) as it is if matches depend on each other.
-
-        Parameters
-        ----------
-        covariance : after a registration, zero where something was frozen
-        share : of what the registration says that counts
-        """
-        active = ~self.frozen & (np.diag(covariance) > 0.0)
+    def discounted(self, covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the covariance (57, 57) after a window as it is if matches depend on each other."""
+        active = ~self.frozen
         honest = np.zeros_like(covariance)
         if active.any():
             block = np.ix_(active, active)
             gained = self._gained(covariance, block)
-            honest[block] = np.linalg.inv(self._information[block] + share * gained)
+            honest[block] = np.linalg.inv(self._information[block] + MATCH_INDEPENDENCE * gained)
         return honest
 
     def carry(

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""Whether poses are as uncertain as stated: shares of errors within 68 % and 95 %, by head.
+"""Whether poses and calibration are as uncertain as stated: shares of errors within 68 % and 95 %, by head.
 
-    python -m benches deviations --flights 60 --first-seed 900
+    python -m benches deviations --flights 60 --first-seed 900 --realism 0 1 3
 
-simulates flights that go through heads and scenes, each with a seed of its own, maps them with and
-without closing their loops, and compares poses and the expected accuracy of the report with the truth.
-Errors are those in flight relative to position and heading of the first pose; honest covariances have 68 %
-of them within one and 95 % within 1.96 standard deviations, and mean squares of one. The errors of a flight go
-together, so that a share of n flights scatters by about 0.45 / √n. Every flight is printed as it is measured
-and kept as JSON; what is there already is not measured again.
+simulates flights that go through heads and scenes, each with a seed of its own, estimates them with and
+without closing their loops, and compares poses, calibration and the expected accuracy of the report with
+the truth. Errors of poses are those in flight relative to position and heading of the first pose; honest
+covariances have 68 % of them within one and 95 % within 1.96 standard deviations, and mean squares of one. The
+errors of a flight go together, so that a share of n flights scatters by about 0.45 / √n. Every flight is
+printed as it is measured and kept as JSON; what is there already is not measured again.
 """
 
 from __future__ import annotations
@@ -29,12 +29,14 @@ HEADS = ("hokuyo-spin", "hokuyo-nod", "vlp16-fixed", "vlp16-side", "vlp16-motor"
 SCENES = ("office", "courtyard", "forest", "cave", "mine")
 GROUPS = {"roll, pitch": [0, 1], "heading": [2], "horizontal": [3, 4], "vertical": [5]}
 BOUNDS = (1.0, 1.959964)
+STATES = ("latency", "extrinsic_rotation", "extrinsic_translation", "gyro_bias")
 COLUMNS = ("loops", "head", "flights", *(f"{name}: 68 %, 95 %" for name in GROUPS), "mean square")
+CALIBRATION = ("loops", *(f"{name}: 68 %, 95 %; mean, median square" for name in STATES))
 LOOPS = ("open", "closed")
 RESULTS = Path(__file__).parent / "results" / "deviations.json"
 
 
-def scenario_of(options: argparse.Namespace, i: int) -> Scenario:
+def scenario_of(options: argparse.Namespace, realism: float, i: int) -> Scenario:
     """The i-th flight; those that follow each other have other heads and other scenes."""
     turn, at = divmod(i, len(options.heads))
     scene = options.scenes[(turn + at) % len(options.scenes)]
@@ -43,7 +45,7 @@ def scenario_of(options: argparse.Namespace, i: int) -> Scenario:
         head=options.heads[at],
         seed=options.first_seed + i,
         duration=options.duration,
-        realism=options.realism,
+        realism=realism,
     )
 
 
@@ -95,6 +97,25 @@ def table(results: list[dict], heads: list[str]) -> str:
     return "\n".join(lines)
 
 
+def calibration_table(results: list[dict]) -> str:
+    """Shares and squares of the errors of slow states, each flight counting alike."""
+    lines = [tables.head(CALIBRATION)]
+    for loops in LOOPS:
+        known = [r["found"][loops] for r in results if "failure" not in r["found"][loops]]
+        cells = []
+        for name in STATES:
+            flights = [np.array(f["calibration"][name]) for f in known if name in f["calibration"]]
+            if not flights:
+                cells.append("-")
+                continue
+            shares = [np.mean([np.mean(np.abs(z) < b) for z in flights]) for b in BOUNDS]
+            squares = [np.mean(np.square(z)) for z in flights]
+            said = ", ".join(f"{share:.0%}" for share in shares)
+            cells.append(f"{said}; {np.mean(squares):.2f}, {np.median(squares):.2f}")
+        lines.append(tables.line([loops, *cells]))
+    return "\n".join(lines)
+
+
 def sentence_table(results: list[dict]) -> str:
     """How often the truth is below what the sentence in the report says."""
     lines = []
@@ -115,22 +136,32 @@ def sentence_table(results: list[dict]) -> str:
 
 
 def main() -> None:
-    """Print the tables."""
+    """Print the tables of each level of realism."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--flights", type=int, default=25)
     parser.add_argument("--first-seed", type=int, default=0)
     parser.add_argument("--scenes", nargs="+", default=list(SCENES))
     parser.add_argument("--heads", nargs="+", default=list(HEADS))
-    parser.add_argument("--realism", type=float, default=0.0, help="errors of real sensors, 0 to 3")
+    parser.add_argument(
+        "--realism", nargs="+", type=float, default=[0.0], help="errors of real sensors, 0 to 3"
+    )
     parser.add_argument("--duration", type=float, default=25.0, help="of each flight, in s")
     parser.add_argument("--work", type=Path, help="keep the simulated recordings here")
     parser.add_argument("--json", type=Path, default=RESULTS, help="default: %(default)s")
     options = parser.parse_args()
     options.json.parent.mkdir(parents=True, exist_ok=True)
     kept = json.loads(options.json.read_text()) if options.json.exists() else {}
+    for realism in options.realism:
+        results = measured_at(realism, options, kept)
+        print(f"\nrealism {realism:g}\n\n{table(results, options.heads)}")
+        print(f"\n{calibration_table(results)}\n\n{sentence_table(results)}\n", flush=True)
+
+
+def measured_at(realism: float, options: argparse.Namespace, kept: dict[str, dict]) -> list[dict]:
+    """What became of all flights at a level; `kept` ones are not flown again."""
     results = []
     for i in range(options.flights):
-        scenario = scenario_of(options, i)
+        scenario = scenario_of(options, realism, i)
         key = " ".join(
             str(getattr(scenario, n)) for n in ("head", "scene", "seed", "duration", "realism")
         )
@@ -141,4 +172,4 @@ def main() -> None:
             options.json.write_text(json.dumps(kept))
             print(progress(key, found), flush=True)
         results.append(kept[key])
-    print(f"\n{table(results, options.heads)}\n\n{sentence_table(results)}")
+    return results

@@ -322,10 +322,15 @@ class Imu:
     ----------
     stamps : (M,) float64, s, IMU clock, non-decreasing
     gyro, accel : (M, 3) float64, rad/s and m/s² (specific force), imu frame
+    at_limit : (M, 6) bool, which axes of both are at the end of their range; None: none is
     """
 
     def __new__(
-        cls, stamps: NDArray[np.float64], gyro: NDArray[np.float64], accel: NDArray[np.float64]
+        cls,
+        stamps: NDArray[np.float64],
+        gyro: NDArray[np.float64],
+        accel: NDArray[np.float64],
+        at_limit: NDArray[np.bool_] | None = None,
     ) -> Imu: ...
     def __len__(self) -> int: ...
 
@@ -721,6 +726,8 @@ class Piece:
     offset : (57,) correction that leads from that mean to `globals`
     frozen : (57) slow states that are not estimated
     optional : (57) those that stay as they are unless the recording shows that they are others
+    doubted : (57) those that stay as they are but are not known exactly, so that the others are the less
+        certain for it
     shown_noise : times, s, and how large the noise of gyro and accelerometer shows itself then, as
         standard deviations over the stated ones; without any as stated. Weights stay as stated.
     """
@@ -736,6 +743,7 @@ class Piece:
         offset: Sequence[float],
         frozen: Sequence[bool],
         optional: Sequence[bool],
+        doubted: Sequence[bool],
         shown_noise: tuple[list[float], list[tuple[float, float]]],
     ) -> Piece: ...
 

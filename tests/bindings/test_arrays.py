@@ -271,9 +271,10 @@ def test_no_argument_is_forgotten():
         scene=_core.Scene, imu=_core.Imu, samples=_core.Samples, place=_core.Samples.place,
         extract_surfels=_core.extract_surfels,
     )  # fmt: skip
-    # `responses` have three axes, see test_pickles.py.
+    # `responses` have three axes, see test_pickles.py, and `at_limit` is of bool, see test_imu_limits.py.
     others = {
         "responses",
+        "at_limit",
         "start",
         "dt",
         "samples",

@@ -35,13 +35,14 @@ pub(crate) struct Piece {
     globals: Py<Globals>,
     prior: GlobalPrior,
     optional: [bool; N_GLOBALS],
+    doubted: [bool; N_GLOBALS],
     shown_noise: core::ShownNoise,
 }
 
 #[pymethods]
 impl Piece {
     #[new]
-    #[pyo3(signature = (samples, surfels, imu, globals, *, information, offset, frozen, optional, shown_noise))]
+    #[pyo3(signature = (samples, surfels, imu, globals, *, information, offset, frozen, optional, doubted, shown_noise))]
     #[allow(
         clippy::large_types_passed_by_value,
         reason = "taken from Python as a whole"
@@ -56,6 +57,7 @@ impl Piece {
         offset: [f64; N_GLOBALS],
         frozen: [bool; N_GLOBALS],
         optional: [bool; N_GLOBALS],
+        doubted: [bool; N_GLOBALS],
         shown_noise: (Vec<f64>, Vec<[f64; 2]>),
     ) -> PyResult<Self> {
         let (times, ratios) = shown_noise;
@@ -74,6 +76,7 @@ impl Piece {
                 frozen,
             },
             optional,
+            doubted,
             shown_noise: core::ShownNoise { times, ratios },
         })
     }
@@ -88,6 +91,7 @@ impl Piece {
             globals: self.globals.get().0.clone(),
             prior: &self.prior,
             optional: self.optional,
+            doubted: self.doubted,
             shown_noise: self.shown_noise.clone(),
         }
     }

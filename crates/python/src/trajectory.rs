@@ -278,6 +278,20 @@ fn pose_responses(array: &PyReadonlyArray3<'_, f64>) -> PyResult<Vec<PoseRespons
     }
 }
 
+fn axes_at_limit<'a>(
+    array: &'a PyReadonlyArray2<'_, bool>,
+    n_rows: usize,
+) -> PyResult<&'a [[bool; 6]]> {
+    let flat = array.as_slice().ok().filter(|_| array.is_c_contiguous());
+    match flat {
+        Some(flat) if array.shape() == [n_rows, 6] => Ok(flat.as_chunks().0),
+        _ => Err(PyValueError::new_err(format!(
+            "at_limit: expected a C-contiguous array ({n_rows}, 6) of bool, got {:?}",
+            array.shape()
+        ))),
+    }
+}
+
 /// Inertial samples in time order.
 #[pyclass(frozen, module = "bentwing._core")]
 pub(crate) struct Imu(pub(crate) RustImu);
@@ -285,10 +299,12 @@ pub(crate) struct Imu(pub(crate) RustImu);
 #[pymethods]
 impl Imu {
     #[new]
+    #[pyo3(signature = (stamps, gyro, accel, at_limit=None))]
     fn new(
         stamps: PyReadonlyArray1<'_, f64>,
         gyro: PyReadonlyArray2<'_, f64>,
         accel: PyReadonlyArray2<'_, f64>,
+        at_limit: Option<PyReadonlyArray2<'_, bool>>,
     ) -> PyResult<Self> {
         let gyro = vectors(finite_rows("gyro", &gyro)?);
         let accel = vectors(finite_rows("accel", &accel)?);
@@ -297,7 +313,11 @@ impl Imu {
             let message = format!("accel: expected {} rows, got {}", gyro.len(), accel.len());
             return Err(PyValueError::new_err(message));
         }
-        Ok(Self(RustImu::new(stamps, gyro, accel)))
+        let Some(at_limit) = at_limit else {
+            return Ok(Self(RustImu::new(stamps, gyro, accel)));
+        };
+        let rows = axes_at_limit(&at_limit, stamps.len())?;
+        Ok(Self(RustImu::with_limits(stamps, gyro, accel, rows)))
     }
 
     fn __len__(&self) -> usize {

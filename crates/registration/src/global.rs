@@ -21,7 +21,6 @@ pub use problem::{Counts, GlobalProblem, Iteration, Piece, Plan};
 pub use result::{GlobalRegistration, PieceResult};
 
 use crate::state::{State, StepSize};
-use crate::system::solve::Factorized;
 use crate::{Health, N_GLOBALS, NormalEquations, Settings, SolveError, Solver};
 
 /// Corrects whole trajectories and their calibrations by everything that was seen more than once.
@@ -46,7 +45,7 @@ pub fn register_globally(
         iterations: Vec::new(),
     };
     let settled = rounds.settle(StepSize::UNKNOWN)?;
-    let (factorized, converged) = rounds.with_what_shows(settled)?;
+    let converged = rounds.with_what_shows(settled)?;
     let Rounds {
         joint,
         mut gatherer,
@@ -61,7 +60,7 @@ pub fn register_globally(
         ..gatherer.counts()
     };
     let finish = |(number, state): (usize, State<'_>)| PieceResult {
-        covariance: joint.covariance(&factorized, number, &state),
+        covariance: posterior.globals(number),
         trajectory: state.trajectory,
         globals: state.globals,
         n_blind: state.n_blind,
@@ -88,12 +87,9 @@ struct Rounds<'a> {
     iterations: Vec<Iteration>,
 }
 
-/// The last equations of some iterations, and whether nothing moved any more.
-type Settled = (Factorized, bool);
-
 impl Rounds<'_> {
-    /// Iterates until nothing moves any more, or as often as it is allowed to.
-    fn settle(&mut self, mut step_size: StepSize) -> Result<Settled, SolveError> {
+    /// Iterates until nothing moves any more, or as often as it is allowed to; tells which.
+    fn settle(&mut self, mut step_size: StepSize) -> Result<bool, SolveError> {
         let mut solver = Solver::default();
         let last = self.iterations.len() + self.settings.max_outer;
         loop {
@@ -115,16 +111,17 @@ impl Rounds<'_> {
             });
             let converged = step_size.converged(&self.settings);
             if converged || self.iterations.len() >= last {
-                return Ok((factorized, converged));
+                return Ok(converged);
             }
         }
     }
 
-    /// Goes on with those of the optional states that show, unless it does not settle with them.
-    fn with_what_shows(&mut self, settled: Settled) -> Result<Settled, SolveError> {
+    /// Goes on with those of the optional states that show, unless it does not settle with them; tells
+    /// whether it has settled.
+    fn with_what_shows(&mut self, settled: bool) -> Result<bool, SolveError> {
         let mut pieces = self.problem.pieces.iter();
         let is_asked = pieces.any(|p| p.optional.contains(&true));
-        if !is_asked || !settled.1 {
+        if !is_asked || !settled {
             return Ok(settled);
         }
         let (without, n_before) = (self.states.clone(), self.iterations.len());
@@ -135,9 +132,8 @@ impl Rounds<'_> {
         // What is wrong with them has moved the poses as fast as the windows could follow.
         let interval = self.settings.knot_interval;
         self.use_knots(self.problem.plan.posterior_interval.min(interval));
-        let found = self.settle(StepSize::NONE)?;
-        if found.1 {
-            return Ok(found);
+        if self.settle(StepSize::NONE)? {
+            return Ok(true);
         }
         self.states = without;
         self.use_knots(interval);

@@ -3,13 +3,11 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use crate::limits::{AtLimit, MAX_BRIDGE};
 use crate::{Trajectory, so3};
 
 /// Samples further apart than this, s, are a gap: nothing is said about the time between them.
 const MAX_GAP: f64 = 0.05;
-
-/// Across a gap of at most this, s, the motion is guessed better by both its ends than by the first.
-const MAX_BRIDGE: f64 = 0.25;
 
 /// Inertial samples in time order, with the running integral of the gyro.
 #[derive(Clone, Debug)]
@@ -22,6 +20,7 @@ pub struct Imu {
     turned: Vec<Vector3<f64>>,
     /// The same of the accelerometer, m/s.
     pushed: Vec<Vector3<f64>>,
+    at_limit: AtLimit,
 }
 
 /// Integrals of the samples over an interval, imu frame, errors of the unit included.
@@ -53,7 +52,36 @@ impl Imu {
             accel,
             turned,
             pushed,
+            at_limit: AtLimit::default(),
         }
+    }
+
+    /// The same where axes were at the limit of their instrument; in `at_limit` those of the gyro come
+    /// before those of the accelerometer. In their place stand values that bridge them.
+    pub fn with_limits(
+        times: Vec<f64>,
+        mut gyro: Vec<Vector3<f64>>,
+        mut accel: Vec<Vector3<f64>>,
+        at_limit: &[[bool; 6]],
+    ) -> Self {
+        let at_limit = AtLimit::new(at_limit);
+        at_limit.bridge(&times, &mut gyro, 0);
+        at_limit.bridge(&times, &mut accel, 3);
+        Self {
+            at_limit,
+            ..Self::new(times, gyro, accel)
+        }
+    }
+
+    /// Which axes of gyro and accelerometer measured all that was in `[from, to]`.
+    pub fn known(&self, from: f64, to: f64) -> [bool; 6] {
+        if self.at_limit.is_empty() {
+            return [true; 6];
+        }
+        let first = self.times.partition_point(|&s| s <= from).saturating_sub(1);
+        let last = self.times.partition_point(|&s| s < to);
+        self.at_limit
+            .none_in(first, last.min(self.len().max(1) - 1))
     }
 
     /// The same with samples on straight lines across short gaps, for a first guess of the motion.

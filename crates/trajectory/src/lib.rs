@@ -5,6 +5,7 @@
 mod correction_spline;
 mod head;
 mod imu;
+mod limits;
 mod motor;
 mod propagation;
 mod range_bias;

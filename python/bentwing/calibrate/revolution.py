@@ -120,10 +120,7 @@ def read_course(part: RecordingPart, shown: Stage) -> Course:
             encoder.append(batch)
         elif isinstance(batch, ImuBatch):
             imu.append(batch)
-    samples = None
-    if imu:
-        columns = ([getattr(b, name) for b in imu] for name in ("times", "gyro", "accel"))
-        samples = ImuBatch(*(np.concatenate(column) for column in columns))
+    samples = ImuBatch.joined(imu) if imu else None
     empty = [np.zeros(0)]
     return Course(
         np.concatenate([b.times for b in encoder] or empty),

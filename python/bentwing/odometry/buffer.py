@@ -94,13 +94,8 @@ class BatchBuffer:
     def imu(self, start: float, stop: float) -> ImuBatch:
         """Return the inertial samples with stamps in `[start, stop)`."""
         parts = [b for b in self._imu if b.times[0] < stop and b.times[-1] >= start]
-        if not parts:
-            return ImuBatch(np.empty(0), np.empty((0, 3)), np.empty((0, 3)))
-        times = np.concatenate([b.times for b in parts])
-        keep = slice(*np.searchsorted(times, [start, stop]))
-        gyro = np.concatenate([b.gyro for b in parts])[keep]
-        accel = np.concatenate([b.accel for b in parts])[keep]
-        return ImuBatch(times[keep], np.ascontiguousarray(gyro), np.ascontiguousarray(accel))
+        whole = ImuBatch.joined(parts)
+        return whole.where(slice(*np.searchsorted(whole.times, [start, stop])))
 
     def first_break(self) -> Break | None:
         """Return the earliest silence that is too long."""

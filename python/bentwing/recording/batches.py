@@ -70,15 +70,38 @@ class ImuBatch(Value):
     times : (M,) float64, s since the recording's start, increasing, IMU clock
     gyro : (M, 3) float64, rad/s, imu frame
     accel : (M, 3) float64, m/s², imu frame (specific force: +g upwards at rest)
+    at_limit : (M, 6) bool or None, axes of gyro and accelerometer that are at the end of their range, so
+        that the truth lies beyond; set by preprocess where any is
     """
 
     times: NDArray[np.float64]
     gyro: NDArray[np.float64]
     accel: NDArray[np.float64]
+    at_limit: NDArray[np.bool_] | None = None
 
     def where(self, keep: NDArray[np.bool_] | NDArray[np.intp] | slice) -> ImuBatch:
         """Return the samples selected by a mask, by indices or by a slice."""
-        return ImuBatch(self.times[keep], self.gyro[keep], self.accel[keep])
+        at_limit = None if self.at_limit is None else self.at_limit[keep]
+        return ImuBatch(self.times[keep], self.gyro[keep], self.accel[keep], at_limit)
+
+    @classmethod
+    def joined(cls, batches: Sequence[ImuBatch]) -> ImuBatch:
+        """Join batches that follow each other; an empty one without any."""
+        if not batches:
+            return cls(np.empty(0), np.empty((0, 3)), np.empty((0, 3)))
+        at_limit = None
+        if any(batch.at_limit is not None for batch in batches):
+            none_of = [np.zeros((len(batch.times), 6), np.bool_) for batch in batches]
+            parts = zip(batches, none_of, strict=True)
+            at_limit = np.concatenate(
+                [none if b.at_limit is None else b.at_limit for b, none in parts]
+            )
+        return cls(
+            np.concatenate([batch.times for batch in batches]),
+            np.concatenate([batch.gyro for batch in batches]),
+            np.concatenate([batch.accel for batch in batches]),
+            at_limit,
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

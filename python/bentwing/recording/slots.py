@@ -69,8 +69,6 @@ def trimmed(batch: Batch, begin: float, end: float) -> Batch | None:
     if low == 0 and high == len(batch.times):
         return batch
     part = slice(low, high)
-    if isinstance(batch, LidarBatch):
+    if isinstance(batch, LidarBatch | ImuBatch):
         return batch.where(part)
-    if isinstance(batch, ImuBatch):
-        return ImuBatch(batch.times[part], batch.gyro[part], batch.accel[part])
     return EncoderBatch(batch.times[part], batch.angles[part])

@@ -11,6 +11,7 @@ import numpy as np
 from bentwing.evaluate.verdict import Verdict, judge_breaks, verdict_of
 from bentwing.map.sample import MapSample
 from bentwing.recording import ImuBatch
+from bentwing.recording.preprocess.imu_limits import limit_sentences
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -181,7 +182,7 @@ class Found:
             "beams": self.beams,
             "set_up": [] if self.set_up is None else self.set_up.findings,
             "warnings": self.warnings,
-            "notes": [] if estimate is None else estimate.notes,
+            "notes": [*limit_sentences(counts), *([] if estimate is None else estimate.notes)],
             "calibration": None if estimate is None else estimate.calibration,
             "localization": localization,
             "loop_closure": self.loop_closure,

@@ -15,8 +15,8 @@ LOST = Evidence("lost", 0.5, (), {"seconds": 9.0})
     ("evidence", "blames"),
     [
         ([LOST], True),
-        ([LOST, Evidence("gyro_limit", 0.02)], True),
-        ([LOST, Evidence("gyro_limit", 0.2)], False),
+        ([LOST, Evidence("gyro_limit", 0.02, (), {"share": 2.0})], True),
+        ([LOST, Evidence("gyro_limit", 0.2, (), {"share": 20.0})], False),
         ([LOST, Evidence("imu_period", 0.04, (), {"rate": 25.0})], True),
         ([LOST, Evidence("imu_period", 0.1, (), {"rate": 10.0})], False),
         ([LOST, Evidence("point_order", 0.6)], False),

@@ -37,6 +37,8 @@ pub fn accel_residual(
 /// What the IMU says at one sample: three rows of the control points `first .. first + 5`.
 pub(crate) struct SampleRows {
     pub first: usize,
+    /// Without those of axes that were at their limit.
+    pub known: [bool; 3],
     pub residual: Vector3<f64>,
     pub knots: [[f64; 30]; 3],
     pub globals: [GlobalVector; 3],
@@ -46,7 +48,7 @@ impl SampleRows {
     /// Adds the rows, with the weight of a sigma and as much more noise than that as is shown.
     fn add(&self, rows: &mut StencilRows<'_>, stated: f64, shown: f64) {
         let group = rows.group(self.first);
-        for row in 0..3 {
+        for row in (0..3).filter(|&row| self.known[row]) {
             group.knots_mut().copy_from_slice(&self.knots[row]);
             group
                 .globals_mut()
@@ -95,8 +97,13 @@ pub(crate) fn gyro_rows(
     spline: &CorrectionSpline,
     n: usize,
 ) -> Option<SampleRows> {
-    let said = imu.increment(trajectory.time(n), trajectory.time(n + 1))?;
-    Some(gyro_rows_of(trajectory, globals, spline, n, &said))
+    let (from, to) = (trajectory.time(n), trajectory.time(n + 1));
+    let said = imu.increment(from, to)?;
+    let [known @ .., _, _, _] = imu.known(from, to);
+    Some(SampleRows {
+        known,
+        ..gyro_rows_of(trajectory, globals, spline, n, &said)
+    })
 }
 
 /// What the accelerometer says around sample `n`; `None` in a gap. `1 <= n < len - 1`.
@@ -108,7 +115,11 @@ pub(crate) fn accel_rows(
     n: usize,
 ) -> Option<SampleRows> {
     let node = imu.node_force(trajectory, n)?;
-    Some(accel_rows_of(trajectory, globals, spline, n, &node))
+    let [_, _, _, known @ ..] = imu.known(trajectory.time(n - 1), trajectory.time(n + 1));
+    Some(SampleRows {
+        known,
+        ..accel_rows_of(trajectory, globals, spline, n, &node)
+    })
 }
 
 fn gyro_rows_of(
@@ -125,6 +136,7 @@ fn gyro_rows_of(
     let J = -so3::right_jacobian_inverse(&trajectory.steps()[n]) * R_next.transpose();
     let mut rows = SampleRows {
         first: stencil.first,
+        known: [true; 3],
         residual: gyro_residual(trajectory, globals, n, said),
         knots: [[0.0; 30]; 3],
         globals: [[0.0; N_GLOBALS]; 3],
@@ -192,6 +204,7 @@ fn accel_rows_of(
     let J_gravity: Matrix3<f64> = R_imu_map * so3::hat(&globals.gravity);
     let mut rows = SampleRows {
         first: curvature.first,
+        known: [true; 3],
         residual: accel_residual(trajectory, globals, n, node),
         knots: [[0.0; 30]; 3],
         globals: [[0.0; N_GLOBALS]; 3],

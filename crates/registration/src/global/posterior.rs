@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! How certain the poses of a global registration are.
+//! How certain the poses and the global states of a global registration are.
 //!
 //! Steps are smooth over the knots of a registration, but what the IMU does not know of the poses walks at
 //! random: where the lidar sees little, as before a head turns, stiff knots would be sure of what they
 //! cannot follow. So the equations are made once more with knots as close as those of the windows.
+//!
+//! The slow states are asked of them too: they, and what the IMU's noise does, explain each other.
 //!
 //! Their inverse would be the covariance if all rows erred as their weights say. The IMU's noise shows
 //! itself larger or smaller, and matches scatter other than stated: `H⁻¹ M H⁻¹` (Huber 1967).
@@ -19,7 +21,9 @@ use super::joint::Joint;
 use super::problem::GlobalProblem;
 use crate::state::State;
 use crate::system::solve::Factorized;
-use crate::{Health, ImuNoise, N_GLOBALS, NormalEquations, Settings, SolveError, Solver};
+use crate::{
+    GlobalMatrix, Health, ImuNoise, N_GLOBALS, NormalEquations, Settings, SolveError, Solver,
+};
 
 /// Poses that are solved for together: of all pairs among them only the diagonal is used.
 const TOGETHER: usize = 8;
@@ -35,6 +39,8 @@ pub struct GlobalPosterior {
     /// Spline and first control point of each piece.
     splines: Vec<(CorrectionSpline, usize)>,
     n_controls: usize,
+    /// First stand-in of each piece's global states, and which of them are frozen.
+    globals: Vec<(usize, [bool; N_GLOBALS])>,
     /// Variances `[δr, δt]` of what is faster than the knots, of each piece.
     fast: Vec<[f64; 2]>,
 }
@@ -57,6 +63,11 @@ impl GlobalPosterior {
         }
         let states = states.iter().map(|s| s.with_knots(knot_interval));
         let mut states: Vec<State<'_>> = states.collect();
+        for (state, piece) in states.iter_mut().zip(&problem.pieces) {
+            for (frozen, doubted) in state.frozen.iter_mut().zip(piece.doubted) {
+                *frozen &= !doubted;
+            }
+        }
         let joint = Joint::new(&states);
         let n_controls = joint.n_controls();
         let mut equations = NormalEquations::new(n_controls);
@@ -80,6 +91,11 @@ impl GlobalPosterior {
             excess,
             match_variance,
             n_controls,
+            globals: states
+                .iter()
+                .enumerate()
+                .map(|(piece, s)| (joint.stand_in(piece), s.frozen))
+                .collect(),
             fast: problem
                 .pieces
                 .iter()
@@ -119,6 +135,26 @@ impl GlobalPosterior {
             self.add_pose(rows, pose, piece, *first, &-carrying(&apart));
         };
         self.in_groups(pairs, add, self.fast[piece].map(|v| 2.0 * v))
+    }
+
+    /// Covariance of the global states of a piece; zero where frozen.
+    pub fn globals(&self, piece: usize) -> GlobalMatrix {
+        let (first, frozen) = &self.globals[piece];
+        let free: Vec<usize> = (0..N_GLOBALS).filter(|&i| !frozen[i]).collect();
+        let mut rows = Mat::<f64>::zeros(6 * self.n_controls + N_GLOBALS, free.len());
+        for (column, i) in free.iter().enumerate() {
+            rows[(6 * first + i, column)] = 1.0;
+        }
+        let known = self
+            .factorized
+            .sandwich_of(&rows, self.match_variance, &self.excess);
+        let mut covariance = GlobalMatrix::zeros();
+        for (r, &i) in free.iter().enumerate() {
+            for (c, &j) in free.iter().enumerate() {
+                covariance[(i, j)] = known[(r, c)];
+            }
+        }
+        covariance
     }
 
     fn in_groups<T>(

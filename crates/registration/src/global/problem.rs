@@ -27,6 +27,8 @@ pub struct Piece<'a> {
     pub prior: &'a GlobalPrior,
     /// Those that stay as they are unless the recording shows that they are others.
     pub optional: [bool; N_GLOBALS],
+    /// Those that stay as they are but are not known exactly: the others are the less certain for it.
+    pub doubted: [bool; N_GLOBALS],
 }
 
 impl Piece<'_> {

@@ -159,6 +159,7 @@ fn a_slow_drift_is_taken_out_of_laps_through_a_room() -> Result<(), SolveError> 
         globals,
         prior: &prior,
         optional: [false; N_GLOBALS],
+        doubted: [false; N_GLOBALS],
     };
     let problem = GlobalProblem {
         pieces: vec![piece],
@@ -220,6 +221,7 @@ fn a_second_piece_with_its_own_latency_joins_the_first() -> Result<(), SolveErro
                 globals: first,
                 prior: &prior_of_first,
                 optional: [false; N_GLOBALS],
+                doubted: [false; N_GLOBALS],
             },
             Piece {
                 trajectory: shifted,
@@ -229,6 +231,7 @@ fn a_second_piece_with_its_own_latency_joins_the_first() -> Result<(), SolveErro
                 globals: second,
                 prior: &prior_of_second,
                 optional: [false; N_GLOBALS],
+                doubted: [false; N_GLOBALS],
             },
         ],
         plan: plan(),
@@ -271,6 +274,7 @@ fn flown(truth: RangeBias, is_asked: bool) -> Result<GlobalRegistration, SolveEr
             globals,
             prior: &prior,
             optional,
+            doubted: [false; N_GLOBALS],
         }],
         plan: plan(),
     };
@@ -311,6 +315,46 @@ fn states_that_do_not_show_change_no_bit() -> Result<(), SolveError> {
 }
 
 #[test]
+fn states_that_are_doubted_stay_as_they_are_and_make_others_no_more_certain()
+-> Result<(), SolveError> {
+    let globals = globals();
+    let chunks = chunks(0.0, 40.0, &globals.head);
+    let mut prior = prior();
+    prior.frozen[index::LATENCY] = false;
+    let rate = index::LATENCY_RATE;
+    prior.information[(rate, rate)] = 1e8;
+    let run = |is_doubted: bool| {
+        let mut doubted = [false; N_GLOBALS];
+        doubted[rate] = is_doubted;
+        let problem = GlobalProblem {
+            pieces: vec![Piece {
+                trajectory: trajectory(0.0, 40.0, slow_drift),
+                chunks: &chunks,
+                imu: None,
+                shown_noise: ShownNoise::default(),
+                globals: globals.clone(),
+                prior: &prior,
+                optional: [false; N_GLOBALS],
+                doubted,
+            }],
+            plan: plan(),
+        };
+        register_globally(&problem, &of_global())
+    };
+    let (known, doubted) = (run(false)?, run(true)?);
+    let [a, b] = [&known, &doubted].map(|f| &f.pieces[0]);
+    assert_eq!(a.trajectory.positions(), b.trajectory.positions());
+    assert_eq!(a.globals.head.clock.rate, b.globals.head.clock.rate);
+    let std = |piece: &PieceResult, g: usize| piece.covariance[(g, g)].sqrt();
+    let (before, after) = (std(a, index::LATENCY), std(b, index::LATENCY));
+    assert!(after > before, "{after} s after {before} s");
+    assert_eq!(std(a, rate), 0.0);
+    // No less certain than before, and no more than matches can tell of a drift within 40 s.
+    assert!((1e-9..=1e-4).contains(&std(b, rate)), "{}", std(b, rate));
+    Ok(())
+}
+
+#[test]
 fn neither_threads_nor_what_is_held_change_a_bit() -> Result<(), SolveError> {
     let (globals, prior) = (globals(), prior());
     let chunks = chunks(0.0, 40.0, &globals.head);
@@ -323,6 +367,7 @@ fn neither_threads_nor_what_is_held_change_a_bit() -> Result<(), SolveError> {
             globals: globals.clone(),
             prior: &prior,
             optional: [false; N_GLOBALS],
+            doubted: [false; N_GLOBALS],
         };
         let problem = GlobalProblem {
             pieces: vec![piece],
@@ -360,6 +405,7 @@ fn a_stretch_is_matched_with_few_others_however_often_it_is_seen() {
         globals,
         prior: &prior,
         optional: [false; N_GLOBALS],
+        doubted: [false; N_GLOBALS],
     };
     let plan = Plan {
         n_visits: 2,
@@ -397,6 +443,7 @@ proptest! {
             globals: scene.globals.clone(),
             prior: &known,
             optional: [false; N_GLOBALS],
+            doubted: [false; N_GLOBALS],
         };
         let pieces = [piece(&one), piece(&two)];
         let states: Vec<State<'_>> =

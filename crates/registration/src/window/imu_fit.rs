@@ -86,7 +86,8 @@ impl Solved<'_> {
         let mean = |(place, said): (usize, &[Option<SampleRows>])| {
             let mut mean = Mean::new(place, self.spline.n_controls());
             for (said, weight) in said.iter().zip(weights) {
-                mean.add(said.as_ref()?, weight / sigma);
+                let said = said.as_ref().filter(|s| s.known == [true; 3])?;
+                mean.add(said, weight / sigma);
             }
             Some(mean)
         };

@@ -21,6 +21,7 @@ from bentwing.recording.batches import EncoderBatch, ImuBatch
 from bentwing.recording.containers.source import open_source
 from bentwing.recording.frames import placed_payload
 from bentwing.recording.preprocess import Preprocessing
+from bentwing.recording.preprocess.imu_limits import limit_sentences
 from bentwing.recording.recording import Recording
 
 if TYPE_CHECKING:
@@ -156,8 +157,10 @@ def _topic_report(
 
 def _inspect_recording(recording: Recording, *, has_payload: bool) -> Inspection:
     judgement = fitness.judge(recording, has_payload=has_payload)
-    spin, structure, carrier = _read(recording, judgement.gyro_scale)
+    counts = Counter[str]()
+    spin, structure, carrier = _read(recording, judgement.gyro_scale, counts)
     warnings = list(judgement.warnings) + carrier_warnings(recording.payload, carrier)
+    warnings += limit_sentences({**recording.counts, **counts})
     if spin is not None:
         warnings += fitness.stall_warnings(spin)
     roles = {
@@ -195,13 +198,16 @@ def _inspect_recording(recording: Recording, *, has_payload: bool) -> Inspection
 
 
 def _read(
-    recording: Recording, gyro_scale: float
+    recording: Recording, gyro_scale: float, counts: Counter[str]
 ) -> tuple[Spin | None, Structure, tuple[SelfHit, ...]]:
-    """Pass once over the recording, keeping the small streams whole and summing up the lidar's."""
+    """Pass once over the recording, keeping the small streams whole and summing up the lidar's.
+
+    What preprocessing would drop, and what it marks, is added to `counts`.
+    """
     imu: list[ImuBatch] = []
     encoder: list[EncoderBatch] = []
     meter, carrier = StructureMeter(), CarrierWatch(recording.payload)
-    preprocessing = Preprocessing(recording.payload, Counter())
+    preprocessing = Preprocessing(recording.payload, counts)
     for batch in recording.batches():
         for usable in preprocessing.add(batch):
             carrier.add(usable)

@@ -47,14 +47,7 @@ class Stretch:
     @property
     def imu(self) -> ImuBatch:
         """All inertial samples; none without an IMU."""
-        parts = [b for b in self.batches if isinstance(b, ImuBatch)]
-        if not parts:
-            return ImuBatch(np.empty(0), np.empty((0, 3)), np.empty((0, 3)))
-        return ImuBatch(
-            np.concatenate([b.times for b in parts]),
-            np.concatenate([b.gyro for b in parts]),
-            np.concatenate([b.accel for b in parts]),
-        )
+        return ImuBatch.joined([b for b in self.batches if isinstance(b, ImuBatch)])
 
     @property
     def lidar(self) -> LidarBatch:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     )
     from bentwing.closing.global_registration.fixed import STAMP
     from bentwing.closing.global_registration.settings import GlobalSettings
-    from bentwing.closing.global_registration.stretches import Collector, Inertial, Stretches
+    from bentwing.closing.global_registration.stretches import Collector, Stretches
 else:
     from bentwing.base.lazy import lazy
 
@@ -33,7 +33,7 @@ else:
             ],
             "closing.global_registration.fixed": ["STAMP"],
             "closing.global_registration.settings": ["GlobalSettings"],
-            "closing.global_registration.stretches": ["Collector", "Inertial", "Stretches"],
+            "closing.global_registration.stretches": ["Collector", "Stretches"],
         },
     )
 
@@ -43,7 +43,6 @@ __all__ = [
     "Closed",
     "Collector",
     "GlobalSettings",
-    "Inertial",
     "Recorded",
     "Registered",
     "Stretches",

@@ -7,6 +7,8 @@ import time
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from bentwing import _core
 from bentwing.base.errors import EstimationError
 from bentwing.base.log import get_logger
@@ -19,7 +21,6 @@ from bentwing.closing.global_registration.outcome import closed_estimate, improv
 from bentwing.closing.global_registration.settings import GlobalSettings
 from bentwing.closing.global_registration.shown_noise import shown_noise
 from bentwing.closing.global_registration.stretches import (
-    Inertial,
     Stretches,
     collect,
     interval_of,
@@ -29,16 +30,21 @@ from bentwing.odometry.continuous.core_settings import CoreSettings
 from bentwing.odometry.continuous.slow_states import (
     RANGE_STATES,
     SLICES,
+    UNIT_STATES,
     SlowStatePrior,
     places_of,
 )
 from bentwing.odometry.core_states import core_globals, core_samples
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
 
     from bentwing.base.estimate import Estimate
-    from bentwing.recording import Batch, Payload
+    from bentwing.recording import Batch, ImuBatch, Payload
 
 _log = get_logger(__name__)
 
@@ -73,7 +79,7 @@ class Recorded:
     estimate: Estimate
     payload: Payload
     segments: list[Stretches]
-    inertial: Inertial
+    inertial: ImuBatch
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,7 +207,16 @@ def register_jointly(
     closed, first = [], len(fixed)
     for r in recorded:
         own = slice(first, first + len(r.segments))
-        closed.append(closed_estimate(r.estimate, found, [s.trajectory for s in r.segments], own))
+        corrected = closed_estimate(
+            r.estimate,
+            found,
+            [s.trajectory for s in r.segments],
+            own,
+            payload=r.payload,
+            has_imu=len(r.inertial.times) > 0,
+            in_map=known is not None,
+        )
+        closed.append(corrected)
         first = own.stop
     return Registered(closed, record)
 
@@ -238,20 +253,32 @@ def _piece(stretches: Stretches, recorded: Recorded, frozen: Iterable[str]) -> _
         # Of a mount that no payload describes the open loop may have left much to be found.
         stated={name: tuple(std) for name, std in estimate.calibration.std.items()},
     )
+    unit = payload.imu.errors_expected if used and payload.imu is not None else {}
+    doubted = {name: unit[name] for name in UNIT_STATES if name in estimate.calibration.std}
     return _core.Piece(
         core_samples(stretches.trajectory),
         stretches.surfels,
         _steadied(stretches, inertial, estimate) if used else None,
         core_globals(estimate.calibration),
-        information=prior.information,
+        information=_doubting(prior.information, doubted),
         offset=prior.offset,
         frozen=prior.frozen.tolist(),
         optional=_OPTIONAL.tolist(),
+        doubted=places_of(doubted).tolist(),
         shown_noise=shown_noise(estimate) if used else ([], []),
     )
 
 
-def _steadied(stretches: Stretches, inertial: Inertial, estimate: Estimate) -> _core.Imu:
+def _doubting(information: Array, std: Mapping[str, float]) -> Array:
+    """Return information (57, 57) with that of states which are held though they are uncertain."""
+    found = information.copy()
+    for name, size in std.items():
+        places = np.arange(len(found))[SLICES[name]]
+        found[places, places] = size**-2
+    return found
+
+
+def _steadied(stretches: Stretches, inertial: ImuBatch, estimate: Estimate) -> _core.Imu:
     """Inertial samples around a segment with the biases of the calibration all the time."""
     times = stretches.trajectory.times
     kept = (inertial.times > times[0] - 0.2) & (inertial.times < times[-1] + 0.2)
@@ -260,4 +287,5 @@ def _steadied(stretches: Stretches, inertial: Inertial, estimate: Estimate) -> _
         at,
         inertial.gyro[kept] - drift_of(estimate, "gyro_bias", at),
         inertial.accel[kept] - drift_of(estimate, "accel_bias", at),
+        None if inertial.at_limit is None else inertial.at_limit[kept],
     )

@@ -40,5 +40,6 @@ def fixed_piece(surfels: _core.Surfels) -> _core.Piece:
         offset=[0.0] * N_STATES,
         frozen=[True] * N_STATES,
         optional=[False] * N_STATES,
+        doubted=[False] * N_STATES,
         shown_noise=([], []),
     )

@@ -12,9 +12,14 @@ from bentwing.base import geometry
 from bentwing.base.covariances import PoseCovariances, positive_part, short_pairs
 from bentwing.base.trajectory import Trajectory
 from bentwing.closing.global_registration.stretches import interval_of
-from bentwing.odometry.continuous.slow_states import named_std
+from bentwing.odometry.continuous.slow_states import (
+    UNIT_STATES,
+    named_std,
+    places_of,
+)
 from bentwing.odometry.core_states import refined
 from bentwing.odometry.segments import joined
+from bentwing.odometry.unseen import Unseen, frame_std, with_frame
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -23,6 +28,7 @@ if TYPE_CHECKING:
 
     from bentwing import _core
     from bentwing.base.estimate import Estimate
+    from bentwing.recording import Payload
 
 # Covariances are computed so often, s, but no more than so many: the cost grows with each.
 POSE_INTERVAL = 0.5
@@ -55,6 +61,10 @@ def closed_estimate(
     found: _core.GlobalRegistration,
     segments: Sequence[Trajectory],
     own: slice,
+    *,
+    payload: Payload,
+    has_imu: bool,
+    in_map: bool,
 ) -> Estimate:
     """Return the estimate with corrected segments and calibration.
 
@@ -62,6 +72,9 @@ def closed_estimate(
     ----------
     segments : of the estimate, as they were registered
     own : which pieces of the result they are
+    payload : as described
+    has_imu : whether there are inertial samples
+    in_map : whether they were registered with a given map
     """
     dt = interval_of(estimate)
     moved = [
@@ -71,18 +84,23 @@ def closed_estimate(
     # Each segment has found a calibration of its own; the longest one knows it best.
     best = int(np.argmax([s.times[-1] - s.times[0] for s in moved]))
     slow, covariance = found.globals[own][best], found.covariances[own][best]
-    frozen = np.diag(covariance) == 0.0
-    calibration = replace(
-        refined(estimate.calibration, slow),
-        std={**estimate.calibration.std, **named_std(covariance, frozen)},
-    )
-    poses = _poses_of(found, moved, own)
+    # What the unit does was held as the open loop knows it.
+    frozen = (np.diag(covariance) == 0.0) | places_of(UNIT_STATES)
+    corrected, std = refined(estimate.calibration, slow), named_std(covariance, frozen)
+    imu = payload.imu if has_imu else None
+    frame = frame_std(corrected, estimate.calibration.std, imu)
+    calibration = replace(corrected, std={**estimate.calibration.std, **with_frame(std, frame)})
+    unseen = Unseen.of(frame, corrected, estimate.windows, payload, in_map=in_map)
+    poses = [
+        unseen.covariances(part, segment)
+        for part, segment in zip(_poses_of(found, moved, own), moved, strict=True)
+    ]
     return replace(
         estimate,
         trajectory=joined(moved, dt),
         calibration=calibration,
         covariances=PoseCovariances.joined(poses),
-        short_variances=_short_variances(found, moved, poses, own),
+        short_variances=_short_variances(found, moved, poses, own, unseen),
     )
 
 
@@ -106,12 +124,14 @@ def _short_variances(
     segments: Sequence[Trajectory],
     poses: Sequence[PoseCovariances],
     own: slice,
+    unseen: Unseen,
 ) -> NDArray[np.float64] | None:
     """Return the mean variances (6,) of poses as seen from those ten metres before."""
     variances = []
     for piece, (segment, part) in enumerate(zip(segments, poses, strict=True), start=own.start):
         pairs = part.times[short_pairs(part.times, segment.interpolate(part.times)[0])]
         matrices = positive_part(found.relative_covariances(piece, pairs.tolist()))
+        matrices = matrices + unseen.short(part.times, segment)
         variances.append(np.einsum("kii->ki", matrices))
     joined_ones = np.concatenate(variances)
     return joined_ones.mean(axis=0) if len(joined_ones) else None

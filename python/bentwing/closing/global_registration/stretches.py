@@ -15,8 +15,6 @@ from bentwing.recording import ImuBatch, LidarBatch
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from numpy.typing import NDArray
-
     from bentwing.base.estimate import Estimate
     from bentwing.base.trajectory import Trajectory
     from bentwing.odometry.continuous.settings import SurfelSettings
@@ -35,15 +33,6 @@ class Stretches:
 
     trajectory: Trajectory
     surfels: list[_core.Surfels] = field(default_factory=list)
-
-
-@dataclass(frozen=True, slots=True)
-class Inertial:
-    """All inertial samples: `times` (M,), `gyro` and `accel` (M, 3); units as in `ImuBatch`."""
-
-    times: NDArray[np.float64]
-    gyro: NDArray[np.float64]
-    accel: NDArray[np.float64]
 
 
 def segments_of(estimate: Estimate) -> list[Trajectory]:
@@ -72,7 +61,7 @@ def collect(
     settings: SurfelSettings,
     range_sigma: float,
     threads: int,
-) -> tuple[list[Stretches], Inertial]:
+) -> tuple[list[Stretches], ImuBatch]:
     """Make the surfels of all segments, with the poses and the calibration of the estimate.
 
     Parameters
@@ -118,10 +107,10 @@ class Collector:
         elif isinstance(batch, LidarBatch) and len(batch.times):
             self._cut(batch)
 
-    def result(self) -> tuple[list[Stretches], Inertial]:
+    def result(self) -> tuple[list[Stretches], ImuBatch]:
         """Finish with what was added."""
         self._extract()
-        return self._found, _joined(self._inertial)
+        return self._found, ImuBatch.joined(self._inertial)
 
     def _cut(self, batch: LidarBatch) -> None:
         """Divide points by stretches; those outside the segments are passed over."""
@@ -158,13 +147,3 @@ class Collector:
             threads=self._threads,
         )
         self._found[self._number].surfels.append(surfels)
-
-
-def _joined(batches: list[ImuBatch]) -> Inertial:
-    if not batches:
-        return Inertial(np.empty(0), np.empty((0, 3)), np.empty((0, 3)))
-    return Inertial(
-        np.concatenate([b.times for b in batches]),
-        np.concatenate([b.gyro for b in batches]),
-        np.concatenate([b.accel for b in batches]),
-    )

@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bentwing.recording.preprocess.imu_limits import LEAST_LIMIT
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bentwing.recording.batches import ImuBatch
-
-# Below this no IMU ends: what repeats there is its resolution, rad/s and m/s².
-_LEAST_LIMIT = np.repeat([0.1, 12.0], 3)
 
 
 class ImuSamples:
@@ -33,6 +32,7 @@ class ImuSamples:
         # Of each axis, the least and the greatest value, and how often it was there twice in a row.
         self._ends = np.full((2, 6), -np.inf)
         self._n_at_end = np.zeros((2, 6), np.int64)
+        self._n_bridged = np.zeros(2, np.int64)
 
     def add(self, batch: ImuBatch) -> None:
         """Take the next samples."""
@@ -42,6 +42,8 @@ class ImuSamples:
         for end, signed in enumerate((values, -values)):
             self._watch_end(end, signed, stays)
         self._before = values[-1:]
+        if batch.at_limit is not None:
+            self._n_bridged += batch.at_limit.reshape(-1, 2, 3).any(axis=2).sum(axis=0)
         self.n += len(values)
         self.first = min(self.first, float(batch.times[0]))
         self.last = max(self.last, float(batch.times[-1]))
@@ -71,10 +73,16 @@ class ImuSamples:
     @property
     def limits(self) -> tuple[float, float]:
         """Share of the samples of the gyro and of the accelerometer that stay at an end of an axis."""
-        beyond = (np.abs(self._ends) > _LEAST_LIMIT) & (self._ends[0] > -self._ends[1])
+        beyond = (np.abs(self._ends) > LEAST_LIMIT) & (self._ends[0] > -self._ends[1])
         shares = np.where(beyond, self._n_at_end, 0).max(axis=0) / max(self.n, 1)
         # Samples that repeat altogether are no limit.
         gyro, accel = np.maximum(shares - self.repeated_share, 0.0).reshape(2, 3).max(axis=1)
+        return float(gyro), float(accel)
+
+    @property
+    def bridged(self) -> tuple[float, float]:
+        """Share of the samples of the gyro and of the accelerometer whose limit estimators bridge."""
+        gyro, accel = self._n_bridged / max(self.n, 1)
         return float(gyro), float(accel)
 
     def _watch_end(self, end: int, values: NDArray[np.float64], stays: NDArray[np.bool_]) -> None:

@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 # So much of a trajectory says something of its set-up, s, m and rad, and of the units alone, s.
 _SOON, _MOVED, _TURNED = 6.5, 0.3, 0.3
 _SOON_UNITS = 4.0
+# Of an error that a sample at its limit makes so much is left where it is bridged.
+_BRIDGED_COUNTS = 0.25
 
 
 def judge_estimate(estimate: Estimate, payload: Payload, watch: Watch) -> list[Evidence]:
@@ -83,14 +85,26 @@ def _judge_samples(watch: Watch) -> list[Evidence]:
 
 
 def _judge_imu(imu: ImuSamples) -> list[Evidence]:
-    gyro, accel = imu.limits
     constant = [Evidence("constant", 1.0, (), {"instrument": name}) for name in imu.constant]
     return [
         *constant,
         Evidence("repeated", imu.repeated_share),
-        Evidence("gyro_limit", gyro),
-        Evidence("accelerometer_limit", accel),
+        *_judge_limits(imu),
         Evidence("imu_period", imu.period, (), {"rate": 1.0 / imu.period}),
+    ]
+
+
+def _judge_limits(imu: ImuSamples) -> list[Evidence]:
+    """Judge by the samples at the end of a range; those that are bridged do less harm."""
+    names = ("gyro_limit", "accelerometer_limit")
+    return [
+        Evidence(
+            name,
+            max(0.0, share - bridged) + _BRIDGED_COUNTS * bridged,
+            (),
+            {"share": 100.0 * max(share, bridged)},
+        )
+        for name, share, bridged in zip(names, imu.limits, imu.bridged, strict=True)
     ]
 
 

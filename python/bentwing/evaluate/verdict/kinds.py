@@ -71,12 +71,12 @@ KINDS: dict[str, Kind] = {
     ),
     "gyro_limit": Kind(
         1, 0.005, 0.05,
-        "{percent:.1f} % of the gyro's samples stay at the end of its range",
+        "{share:.1f} % of the gyro's samples stay at the end of its range",
         "set a larger range in the IMU, or turn more slowly",
     ),
     "accelerometer_limit": Kind(
         1, 0.005, 0.05,
-        "{percent:.1f} % of the accelerometer's samples stay at the end of its range",
+        "{share:.1f} % of the accelerometer's samples stay at the end of its range",
         "set a larger range in the IMU, or damp the head",
     ),
     "imu_period": Kind(

@@ -139,7 +139,12 @@ class Continuous(Estimator):
         self, passes: list[OdometryPass], breaks: list[Break], first_turn: float
     ) -> Estimate:
         return estimate_of(
-            passes, self._described, breaks, first_turn=first_turn, has_imu=self._has_imu
+            passes,
+            self._described,
+            breaks,
+            first_turn=first_turn,
+            payload=self._payload,
+            has_imu=self._has_imu,
         )
 
     def _ready_until(self, *, finishing: bool) -> float | None:

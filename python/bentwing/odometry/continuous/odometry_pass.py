@@ -183,7 +183,7 @@ class OdometryPass:
         if not buffer.has_imu:
             return None
         batch = buffer.imu(self._window_start(end) - 0.2, end + MARGIN + 0.2)
-        return _core.Imu(batch.times, batch.gyro, batch.accel)
+        return _core.Imu(batch.times, batch.gyro, batch.accel, batch.at_limit)
 
     def _extract(self, stretch: LidarStretch) -> _core.Surfels:
         return _core.extract_surfels(

@@ -17,6 +17,7 @@ from bentwing.odometry.continuous.slow_states import at_epoch, named_std
 from bentwing.odometry.core_states import refined
 from bentwing.odometry.health import unseen_sentences
 from bentwing.odometry.segments import joined
+from bentwing.odometry.unseen import Unseen, frame_std, with_frame
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from bentwing.base.trajectory import Trajectory
     from bentwing.base.window_record import WindowRecord
     from bentwing.odometry.continuous.odometry_pass import OdometryPass
+    from bentwing.recording import Payload
 
 
 def estimate_of(
@@ -36,6 +38,7 @@ def estimate_of(
     breaks: Sequence[Break],
     *,
     first_turn: float,
+    payload: Payload,
     has_imu: bool,
 ) -> Estimate:
     """Return what passes that follow each other say, levelled.
@@ -46,6 +49,7 @@ def estimate_of(
     described : the slow states as the payload has them
     breaks : that were judged
     first_turn : s, before which the head of a 2D lidar had not turned once, and saw single planes
+    payload : as described
     has_imu : whether there are inertial samples
     """
     segments, last = [p.trajectory() for p in passes], passes[-1]
@@ -55,11 +59,18 @@ def estimate_of(
     slow = last.globals
     whole = joined(segments)
     middle = 0.5 * float(whole.times[0] + whole.times[-1])
+    found = refined(described, slow)
+    std = named_std(at_epoch(last.covariance, middle - slow.latency_epoch), last.prior.frozen)
+    frame = frame_std(found, std, payload.imu if has_imu else None)
     calibration = replace(
-        refined(described, slow),
+        found,
         gravity=np.array([0.0, 0.0, STANDARD_GRAVITY]),
-        std=named_std(at_epoch(last.covariance, middle - slow.latency_epoch), last.prior.frozen),
+        std=with_frame(std, frame),
     ).with_epoch(middle)
+    unseen = Unseen.of(frame, found, windows, payload)
+    covariances = [
+        unseen.covariances(p.covariances(s), s) for p, s in zip(passes, segments, strict=True)
+    ]
     return Estimate(
         whole,
         calibration,
@@ -73,18 +84,22 @@ def estimate_of(
         notes=_notes(windows, first_turn),
         breaks=[*breaks],
         segments=[(float(s.times[0]), float(s.times[-1])) for s in segments],
-        covariances=PoseCovariances.joined(
-            [p.covariances(s) for p, s in zip(passes, segments, strict=True)]
-        ),
-        short_variances=_short_variances(passes, segments),
+        covariances=PoseCovariances.joined(covariances),
+        short_variances=_short_variances(passes, segments, covariances, unseen),
     )
 
 
 def _short_variances(
-    passes: Sequence[OdometryPass], segments: Sequence[Trajectory]
+    passes: Sequence[OdometryPass],
+    segments: Sequence[Trajectory],
+    covariances: Sequence[PoseCovariances],
+    unseen: Unseen,
 ) -> NDArray[np.float64] | None:
     """Return the mean variances (6,) of poses as seen from those ten metres before."""
-    parts = [p.short_covariances(s) for p, s in zip(passes, segments, strict=True)]
+    parts = [
+        p.short_covariances(s) + unseen.short(c.times, s)
+        for p, s, c in zip(passes, segments, covariances, strict=True)
+    ]
     variances = np.einsum("kii->ki", np.concatenate(parts))
     return variances.mean(axis=0) if len(variances) else None
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from bentwing.recording.batches import EncoderBatch, LidarBatch
+from bentwing.recording.batches import EncoderBatch, ImuBatch, LidarBatch
 from bentwing.recording.preprocess.encoder import EncoderAngles
+from bentwing.recording.preprocess.imu_limits import ImuLimits
 from bentwing.recording.preprocess.ranges import within_range
 from bentwing.recording.preprocess.self_hits import outside_boxes
 
@@ -28,13 +29,13 @@ def preprocess(
     batches : in the order of the recording
     payload : ranges, self-hit boxes, and whether there is an encoder
     counts : receives `preprocess.range`, `preprocess.self_hits`, `preprocess.no_encoder_angle`,
-        the points dropped for each reason
+        the points dropped for each reason, and inertial samples at a limit: see `ImuLimits`
 
     Yields
     ------
     Batch
-        IMU and encoder batches as they came; lidar batches without the dropped points, with an
-        encoder as soon as its angles reach beyond them.
+        Encoder batches as they came, IMU batches with what is at a limit; lidar batches without the
+        dropped points, with an encoder as soon as its angles reach beyond them.
     """
     chain = Preprocessing(payload, counts)
     for batch in batches:
@@ -54,6 +55,7 @@ class Preprocessing:
         self._payload = payload
         self._counts = counts
         encoder = payload.encoder
+        self._limits = ImuLimits(counts)
         self._encoder = None if encoder is None else EncoderAngles(counts, encoder.delay)
 
     def add(self, batch: Batch) -> Iterator[Batch]:
@@ -63,7 +65,7 @@ class Preprocessing:
             if len(kept.times):
                 yield from [kept] if self._encoder is None else self._encoder.add_lidar(kept)
             return
-        yield batch
+        yield self._limits.marked(batch) if isinstance(batch, ImuBatch) else batch
         if isinstance(batch, EncoderBatch) and self._encoder is not None:
             yield from self._encoder.add_encoder(batch)
 

@@ -352,7 +352,11 @@ fn states_that_are_doubted_stay_as_they_are_and_make_others_no_more_certain()
     assert!(after > 1.1 * before, "{after} m after {before} m");
     assert_eq!(std(a, grazing), 0.0);
     // More certain than before, as the walls show it.
-    assert!((1e-6..6e-4).contains(&std(b, grazing)), "{}", std(b, grazing));
+    assert!(
+        (1e-6..6e-4).contains(&std(b, grazing)),
+        "{}",
+        std(b, grazing)
+    );
     Ok(())
 }
 

@@ -84,7 +84,7 @@ def describe_by_trials(
     unmounted = delays[: LIKELY_UNMOUNTED if given is None else 1]
     mounted = itertools.chain(*map(descriptions.of_mounts, unmounted))
     others = itertools.chain(mounted, delayed[LIKELY:])
-    if found := _first(trials.at_a_glance(other) for other in others):
+    if found := _first(trials.at_a_glance(other) for other in others) or trials.least_strained():
         return found
     trials.require_scale_in_what_was_refused()
     if given is not None:

@@ -40,6 +40,7 @@ class Trials:
         self._known: dict[tuple[str, float, float], Trial] = {}
         self._best: Trial | None = None
         self._refused: list[Refinement] = []
+        self._strained: list[Refinement] = []
 
     def as_described(self, payload: Payload) -> Payload | None:
         """Return what a description has become if all fits together with it and it hardly changes."""
@@ -105,11 +106,22 @@ class Trials:
         """Say how well the best description did."""
         return "nothing that can be seen" if self._best is None else self._best.sentence
 
-    def _consistent(self, payload: Payload, rotation: float) -> Payload | None:
-        return self._refined(payload, self._tried(payload, rotation, TRIED))
+    def least_strained(self) -> Payload | None:
+        """Return the best of what was set aside because its accelerometer disagrees."""
+        strained = sorted(self._strained, key=lambda r: r.trial.force)
+        return self._found_by(strained[0]) if strained else None
 
-    def _refined(self, payload: Payload, trial: Trial) -> Payload | None:
-        """Return what a consistent trial has told, if it holds for longer as well."""
+    def _consistent(self, payload: Payload, rotation: float) -> Payload | None:
+        trial = self._tried(payload, rotation, TRIED)
+        return self._refined(payload, trial, believed=rotation == AS_DESCRIBED)
+
+    def _refined(self, payload: Payload, trial: Trial, *, believed: bool = False) -> Payload | None:
+        """Return what a consistent trial has told, if it holds for longer as well.
+
+        Parameters
+        ----------
+        believed : also where the accelerometer disagrees more than it does with a right description
+        """
         if not trial.is_consistent:
             return None
         refinement = Refinement(
@@ -119,10 +131,17 @@ class Trials:
             threads=self._threads,
         )
         self._note(refinement.trial)
-        found = refinement.found()
-        if found is None:
+        if not refinement.trial.is_consistent:
             self._refused.append(refinement)
-        else:
+            return None
+        if refinement.trial.is_strained and not believed:
+            self._strained.append(refinement)
+            return None
+        return self._found_by(refinement)
+
+    def _found_by(self, refinement: Refinement) -> Payload | None:
+        found = refinement.found()
+        if found is not None:
             refinement.require_scale_of_ranges()
         return found
 

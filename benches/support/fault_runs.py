@@ -58,7 +58,16 @@ class Flight:
         with TemporaryDirectory(dir=self.folder) as scratch:
             run, said = Path(scratch) / "run", Path(scratch) / "said.txt"
             described = ["--payload", folder / "payload.yaml"] if payload else []
-            words = ["map", folder / "recording.bag", *described, "-o", run, "--quiet", *self.words]
+            words = [
+                "map",
+                folder / "recording.bag",
+                *described,
+                "-o",
+                run,
+                "--quiet",
+                "--no-refine",
+                *self.words,
+            ]
             finished = python("-m", "bentwing", *words, output=said)
             record = _record(run)
             error = _error(self.truth, run, fault) if finished.code in (0, 4) else None

@@ -104,6 +104,25 @@ fn prior() -> GlobalPrior {
     }
 }
 
+/// A piece without an IMU, of which all free states are asked.
+fn lidar_alone<'a>(
+    trajectory: Trajectory,
+    chunks: &'a [Arc<SurfelSet>],
+    globals: Globals,
+    prior: &'a GlobalPrior,
+) -> Piece<'a> {
+    Piece {
+        trajectory,
+        chunks,
+        imu: None,
+        shown_noise: ShownNoise::default(),
+        globals,
+        prior,
+        optional: [false; N_GLOBALS],
+        doubted: [false; N_GLOBALS],
+    }
+}
+
 fn plan() -> Plan {
     Plan {
         n_visits: 4,
@@ -151,16 +170,7 @@ fn a_slow_drift_is_taken_out_of_laps_through_a_room() -> Result<(), SolveError> 
         trajectory(0.0, 60.0, slow_drift),
     );
     let chunks = chunks(0.0, 60.0, &globals.head);
-    let piece = Piece {
-        trajectory: drifted.clone(),
-        chunks: &chunks,
-        imu: None,
-        shown_noise: ShownNoise::default(),
-        globals,
-        prior: &prior,
-        optional: [false; N_GLOBALS],
-        doubted: [false; N_GLOBALS],
-    };
+    let piece = lidar_alone(drifted.clone(), &chunks, globals, &prior);
     let problem = GlobalProblem {
         pieces: vec![piece],
         plan: plan(),
@@ -213,26 +223,8 @@ fn a_second_piece_with_its_own_latency_joins_the_first() -> Result<(), SolveErro
     let (held, prior_of_first) = (trajectory(0.0, 20.0, |_| Vector3::zeros()), prior());
     let problem = GlobalProblem {
         pieces: vec![
-            Piece {
-                trajectory: held,
-                chunks: &a,
-                imu: None,
-                shown_noise: ShownNoise::default(),
-                globals: first,
-                prior: &prior_of_first,
-                optional: [false; N_GLOBALS],
-                doubted: [false; N_GLOBALS],
-            },
-            Piece {
-                trajectory: shifted,
-                chunks: &b,
-                imu: None,
-                shown_noise: ShownNoise::default(),
-                globals: second,
-                prior: &prior_of_second,
-                optional: [false; N_GLOBALS],
-                doubted: [false; N_GLOBALS],
-            },
+            lidar_alone(held, &a, first, &prior_of_first),
+            lidar_alone(shifted, &b, second, &prior_of_second),
         ],
         plan: plan(),
     };
@@ -267,14 +259,8 @@ fn flown(truth: RangeBias, is_asked: bool) -> Result<GlobalRegistration, SolveEr
     }
     let problem = GlobalProblem {
         pieces: vec![Piece {
-            trajectory: trajectory(0.0, 40.0, slow_drift),
-            chunks: &chunks,
-            imu: None,
-            shown_noise: ShownNoise::default(),
-            globals,
-            prior: &prior,
             optional,
-            doubted: [false; N_GLOBALS],
+            ..lidar_alone(trajectory(0.0, 40.0, slow_drift), &chunks, globals, &prior)
         }],
         plan: plan(),
     };
@@ -330,14 +316,13 @@ fn states_that_are_doubted_stay_as_they_are_and_make_others_no_more_certain()
         doubted[grazing] = is_doubted;
         let problem = GlobalProblem {
             pieces: vec![Piece {
-                trajectory: trajectory(0.0, 40.0, slow_drift),
-                chunks: &chunks,
-                imu: None,
-                shown_noise: ShownNoise::default(),
-                globals: globals.clone(),
-                prior: &prior,
-                optional: [false; N_GLOBALS],
                 doubted,
+                ..lidar_alone(
+                    trajectory(0.0, 40.0, slow_drift),
+                    &chunks,
+                    globals.clone(),
+                    &prior,
+                )
             }],
             plan: plan(),
         };
@@ -365,16 +350,12 @@ fn neither_threads_nor_what_is_held_change_a_bit() -> Result<(), SolveError> {
     let (globals, prior) = (globals(), prior());
     let chunks = chunks(0.0, 40.0, &globals.head);
     let run = |threads: usize, n_held: usize| {
-        let piece = Piece {
-            trajectory: trajectory(0.0, 40.0, slow_drift),
-            chunks: &chunks,
-            imu: None,
-            shown_noise: ShownNoise::default(),
-            globals: globals.clone(),
-            prior: &prior,
-            optional: [false; N_GLOBALS],
-            doubted: [false; N_GLOBALS],
-        };
+        let piece = lidar_alone(
+            trajectory(0.0, 40.0, slow_drift),
+            &chunks,
+            globals.clone(),
+            &prior,
+        );
         let problem = GlobalProblem {
             pieces: vec![piece],
             plan: Plan { n_held, ..plan() },
@@ -403,16 +384,12 @@ fn neither_threads_nor_what_is_held_change_a_bit() -> Result<(), SolveError> {
 fn a_stretch_is_matched_with_few_others_however_often_it_is_seen() {
     let (globals, prior) = (globals(), prior());
     let chunks = chunks(0.0, 60.0, &globals.head);
-    let piece = Piece {
-        trajectory: trajectory(0.0, 60.0, |_| Vector3::zeros()),
-        chunks: &chunks,
-        imu: None,
-        shown_noise: ShownNoise::default(),
+    let piece = lidar_alone(
+        trajectory(0.0, 60.0, |_| Vector3::zeros()),
+        &chunks,
         globals,
-        prior: &prior,
-        optional: [false; N_GLOBALS],
-        doubted: [false; N_GLOBALS],
-    };
+        &prior,
+    );
     let plan = Plan {
         n_visits: 2,
         ..plan()
@@ -441,16 +418,7 @@ proptest! {
         let mut known = prior();
         known.frozen = [false; N_GLOBALS];
         let chunks = [Arc::new(set.clone())];
-        let piece = |scene: &Scene| Piece {
-            trajectory: scene.trajectory.clone(),
-            chunks: &chunks,
-            imu: None,
-            shown_noise: ShownNoise::default(),
-            globals: scene.globals.clone(),
-            prior: &known,
-            optional: [false; N_GLOBALS],
-            doubted: [false; N_GLOBALS],
-        };
+        let piece = |scene: &Scene| lidar_alone(scene.trajectory.clone(), &chunks, scene.globals.clone(), &known);
         let pieces = [piece(&one), piece(&two)];
         let states: Vec<State<'_>> =
             pieces.iter().map(|p| p.state(&settings())).collect();

@@ -13,6 +13,7 @@ from bentwing.evaluate.verdict.inertial import judge_inertial
 from bentwing.evaluate.verdict.matches import judge_matches
 from bentwing.evaluate.verdict.path import judge_path
 from bentwing.evaluate.verdict.rows import judge_rows
+from bentwing.evaluate.verdict.usual import usual_of
 from bentwing.evaluate.verdict.verdict import verdict_of
 from bentwing.recording import imu_units
 
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from bentwing.base.trajectory import Trajectory
     from bentwing.evaluate.verdict.imu_samples import ImuSamples
     from bentwing.evaluate.verdict.inertial_track import InertialTrack
+    from bentwing.evaluate.verdict.usual import Usual
     from bentwing.evaluate.verdict.verdict import Verdict
     from bentwing.evaluate.verdict.watch import Watch
     from bentwing.recording.payload import Payload
@@ -36,7 +38,7 @@ def judge_estimate(estimate: Estimate, payload: Payload, watch: Watch) -> list[E
     """Return the evidence on an open-loop estimate and on the samples that it was made of."""
     calibration = estimate.calibration
     return [
-        *_judge_samples(watch),
+        *_judge_samples(watch, usual_of(estimate.windows)),
         *judge_matches(estimate.windows),
         *judge_inertial(estimate, watch.track, payload.imu),
         *judge_rows(estimate.windows, payload.imu),
@@ -74,8 +76,10 @@ def _has_moved(trajectory: Trajectory) -> bool:
     return moved > _MOVED or turned > 1.0 - np.cos(_TURNED / 2)
 
 
-def _judge_samples(watch: Watch) -> list[Evidence]:
-    found = [] if not watch.imu.n else [*_judge_imu(watch.imu), *_judge_units(watch.track)]
+def _judge_samples(watch: Watch, usual: Usual) -> list[Evidence]:
+    found = []
+    if watch.imu.n:
+        found = [*_judge_imu(watch.imu, usual), *_judge_units(watch.track)]
     returns = watch.returns
     return [
         *found,
@@ -84,23 +88,24 @@ def _judge_samples(watch: Watch) -> list[Evidence]:
     ]
 
 
-def _judge_imu(imu: ImuSamples) -> list[Evidence]:
+def _judge_imu(imu: ImuSamples, usual: Usual) -> list[Evidence]:
     constant = [Evidence("constant", 1.0, (), {"instrument": name}) for name in imu.constant]
     return [
         *constant,
         Evidence("repeated", imu.repeated_share),
-        *_judge_limits(imu),
+        *_judge_limits(imu, usual),
         Evidence("imu_period", imu.period, (), {"rate": 1.0 / imu.period}),
     ]
 
 
-def _judge_limits(imu: ImuSamples) -> list[Evidence]:
-    """Judge by the samples at the end of a range; those that are bridged do less harm."""
+def _judge_limits(imu: ImuSamples, usual: Usual) -> list[Evidence]:
+    """Judge by the samples at the end of a range; where an estimator bridges them they do less harm."""
     names = ("gyro_limit", "accelerometer_limit")
+    counts = _BRIDGED_COUNTS if usual.bridges else 1.0
     return [
         Evidence(
             name,
-            max(0.0, share - bridged) + _BRIDGED_COUNTS * bridged,
+            max(0.0, share - bridged) + counts * bridged,
             (),
             {"share": 100.0 * max(share, bridged)},
         )

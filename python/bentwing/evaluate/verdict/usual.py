@@ -21,17 +21,19 @@ class Usual:
     outliers : share of the matches, in a stretch of some seconds
     rate, force : rad/s and m/s², between trajectory and IMU over a step of half a second
     drift : m a metre, open-loop
+    bridges : whether inertial samples at the end of their range are bridged
     """
 
     outliers: float
     rate: float
     force: float
     drift: float
+    bridges: bool = False
 
 
 # Half a milliradian and some millimetres at both ends of a step; a sweep or a scan says less than a
 # window of several seconds, and the poses of scans know nothing of the IMU.
-_WINDOWS = Usual(outliers=0.01, rate=1e-3, force=0.05, drift=0.002)
+_WINDOWS = Usual(outliers=0.01, rate=1e-3, force=0.05, drift=0.002, bridges=True)
 _SWEEPS = Usual(outliers=0.04, rate=2e-3, force=0.15, drift=0.01)
 _SCANS = Usual(outliers=0.08, rate=6e-3, force=0.3, drift=0.015)
 

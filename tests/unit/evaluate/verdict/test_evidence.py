@@ -135,6 +135,20 @@ def test_an_imu_that_is_wrong_is_named(change, kind):
     assert kind in kinds(estimate(), watched(change))
 
 
+@pytest.mark.parametrize(("registered", "is_doubted"), [(None, False), (True, True)])
+def test_samples_at_a_limit_do_less_harm_where_the_estimator_bridges_them(registered, is_doubted):
+    """Windows bridge them; the sweeps of the filter, whose records say whether they were registered, do not."""
+    watch = watched()
+    for start in (5.0, 15.0):
+        times = LENGTH + start + 0.005 * np.arange(20)
+        rest = np.zeros((20, 3))
+        at_limit = np.zeros((20, 6), np.bool_)
+        at_limit[:, 0] = True
+        watch.imu.add(ImuBatch(times, rest + 1e-3 * times[:, None], rest + G, at_limit))
+    found = estimate(windows=[record(float(t), registered=registered) for t in range(2, 30)])
+    assert ("gyro_limit" in kinds(found, watch)) == is_doubted
+
+
 @pytest.mark.parametrize("times", [0.8, 1.05, 1.3])
 def test_ranges_of_a_wrong_scale_are_told_with_the_factor(times):
     found = estimate()

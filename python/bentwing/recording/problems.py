@@ -9,6 +9,7 @@ from bentwing.base.clock import NS_PER_S
 from bentwing.recording.messages.lidar_messages import is_planar
 
 if TYPE_CHECKING:
+    from bentwing.recording.clocks.rates import ClockRate
     from bentwing.recording.peek import Peek
 
 MAX_CLOCK_OFFSET = 10.0  # s between the sensors' clocks; more and they do not share one
@@ -66,4 +67,15 @@ def clocks(lidar: Peek, other: Peek, section: str, offset: float) -> str | None:
         f"{other.topic.name} and {lidar.topic.name} are stamped by clocks {difference:+.1f} s "
         f"apart; say so in the payload with '{section}: {{clock_offset: {offset - difference:.3f}}}', or "
         "let both drivers stamp with the host's clock and record again"
+    )
+
+
+def clock_rates(lidar: ClockRate, imu: ClockRate) -> str:
+    """Return the sentence on two sensors of which one has a clock that runs fast or slow."""
+    right, wrong = sorted((lidar, imu), key=lambda rate: abs(rate.gain))
+    off = 1e3 * (wrong.gain - right.gain)
+    return (
+        f"the clock of {wrong.topic} {'gains' if off > 0 else 'loses'} {abs(off):.1f} ms a second on that of "
+        f"{right.topic}, by the recorder's times, so that they fit at one moment only; let both drivers stamp with "
+        "the host's clock, or set the sensors' clocks by PTP or GPS, and record again"
     )

@@ -13,6 +13,7 @@ from bentwing.base.errors import PayloadError, RecordingError
 from bentwing.base.log import get_logger
 from bentwing.recording import imu_units, problems
 from bentwing.recording.clocks.look_ahead import look_ahead
+from bentwing.recording.clocks.rates import rate_of, run_apart
 from bentwing.recording.containers.source import open_source
 from bentwing.recording.fixes import Fixes, read_fixes
 from bentwing.recording.frames import placed
@@ -176,6 +177,15 @@ class Recording:
                 problem = problems.clocks(self._peeks["lidar"], self._peeks[role], role, offset)
                 found += [] if problem is None else [problem]
         return found
+
+    def clock_rate_problem(self) -> str | None:
+        """Return the sentence on a lidar and an IMU whose clocks run apart, by the recorder's times."""
+        if "imu" not in self._peeks:
+            return None
+        lidar, imu = (rate_of(self._source, self._peeks[role]) for role in ("lidar", "imu"))
+        if lidar is None or imu is None or not run_apart(lidar, imu):
+            return None
+        return problems.clock_rates(lidar, imu)
 
     def imu_batches(self) -> Iterator[Batch]:
         """Yield the IMU's samples alone, in a pass of their own that leaves the counts as is."""

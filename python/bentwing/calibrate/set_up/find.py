@@ -94,6 +94,7 @@ class _Search:
             self._stretch = read_stretch(recording, after)
             self._imu = recording.imu_topic
             self._encoder = None if payload.encoder is None else recording.encoder_topic
+            self._clocks = recording.clock_rate_problem()
 
     @property
     def believes_the_hand(self) -> bool:
@@ -102,6 +103,8 @@ class _Search:
 
     def found(self) -> Payload:
         """Return the payload with all that was found."""
+        if self._clocks is not None:
+            raise DefectError(self._clocks)
         points = self._stretch.lidar.points
         if not len(points):
             msg = "the lidar has no return in the part with motion: check that it was not covered"

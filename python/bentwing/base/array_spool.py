@@ -74,8 +74,8 @@ class ArraySpool:
         OSError
             The disk is full, or has too little left.
         """
-        # The largest items first, so that all columns are aligned when the table is read at once.
-        ordered = sorted(columns.items(), key=lambda column: -column[1].dtype.itemsize)
+        # The largest alignment first, so that all columns are aligned when the table is read at once.
+        ordered = sorted(columns.items(), key=lambda column: -column[1].dtype.alignment)
         layout = tuple((name, values.dtype, values.shape[1:]) for name, values in ordered)
         n_bytes = sum(values.nbytes for values in columns.values())
         self._make_room(n_bytes)

@@ -21,6 +21,7 @@ EXAMPLES = (
     "bentwing export run -o site.copc.laz --spacing 0.02",
     "bentwing export run -o hall.e57 --box 0,0,-1,30,20,8",
     "bentwing export run -o plot.laz --polygon plot.geojson --heights 0,2.5",
+    "bentwing export run -o normals.ply --normals",
     "bentwing export run -o near.ply --within 15 --times 30,200",
     "bentwing export run -o tiles.laz --tiles 50 --epsg 25832",
     "bentwing export run -o path.kml",
@@ -116,6 +117,15 @@ def command(
             help="Whether to move points to the surface that they measured together.",
         ),
     ] = None,
+    normals: Annotated[
+        bool | None,
+        option(
+            MAP,
+            "--normals/--no-normals",
+            show_default="as in the map",
+            help="Whether points have the normal of their surface, towards the lidar.",
+        ),
+    ] = None,
     epsg: Annotated[
         int | None,
         option(
@@ -149,6 +159,7 @@ def command(
         keep_moving=keep_moving,
         keep_mixed=keep_mixed,
         refine=refine,
+        normals=normals,
         epsg=epsg,
         local=local,
     )

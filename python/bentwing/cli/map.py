@@ -32,6 +32,7 @@ def command(
     keep_moving: options.KeepMoving = False,
     keep_mixed: options.KeepMixed = False,
     no_refine: options.NoRefine = False,
+    normals: options.Normals = False,
     georeference: options.Georeference = None,
     epsg: options.Epsg = None,
     gnss: options.Gnss = None,
@@ -90,6 +91,7 @@ def command(
         map_spacing=map_spacing,
         cleaning=options.cleaning(keep_mixed=keep_mixed, keep_moving=keep_moving),
         refine=False if no_refine else None,
+        normals=True if normals else None,
         georeferencing=given(
             mode=georeference,
             epsg=epsg,

@@ -31,6 +31,7 @@ def command(
     keep_moving: options.KeepMoving = False,
     keep_mixed: options.KeepMixed = False,
     no_refine: options.NoRefine = False,
+    normals: options.Normals = False,
     georeference: options.Georeference = None,
     epsg: options.Epsg = None,
     control_points: options.ControlPoints = None,
@@ -61,6 +62,7 @@ def command(
         cleaning=CleanSettings(**options.cleaning(keep_mixed=keep_mixed, keep_moving=keep_moving)),
         project=project,
         refine=not no_refine,
+        normals=normals,
         threads=threads,
         progress=create_progress(quiet=quiet),
     )

@@ -146,6 +146,12 @@ NoRefine = Annotated[
         "together.",
     ),
 ]
+Normals = Annotated[
+    bool,
+    option(
+        MAP, "--normals", help="Give points the normal of their surface, towards the lidar."
+    ),
+]
 KeepMixed = Annotated[bool, option(MAP, "--keep-mixed", help="Keep returns between two surfaces.")]
 
 Georeference = Annotated[

@@ -34,6 +34,8 @@ class MapChunk:
         lidar; the range is as it was measured
     sigma : (N,) float32 or None, m, standard deviation along the beam; NaN where it is not known
     run_id : (N,) uint16 or None, of a map of several runs, which of them
+    normals : (N, 3) float32 or None, unit, towards the lidar; NaN where they are not known
+    attributes : (N,) structured or None, further fields of the recording, as its messages have them
     """
 
     points: NDArray[np.float64]
@@ -48,6 +50,8 @@ class MapChunk:
     shift: NDArray[np.float32] | None = None
     sigma: NDArray[np.float32] | None = None
     run_id: NDArray[np.uint16] | None = None
+    normals: NDArray[np.float32] | None = None
+    attributes: NDArray[np.void] | None = None
 
     def __len__(self) -> int:
         return len(self.times)
@@ -70,3 +74,11 @@ class MapChunk:
 def untimed(points: NDArray[np.float64]) -> MapChunk:
     """Points (N, 3) m of which nobody asks when and from where they were measured."""
     return MapChunk(points, np.zeros(len(points)), np.zeros(len(points), np.float32))
+
+
+def beams_of(chunk: MapChunk) -> NDArray[np.float32]:
+    """Return the unit directions (N, 3) of the beams of a chunk, which it has to have."""
+    if chunk.beams is None:
+        msg = "chunk.beams: expected the direction of every beam, got None"
+        raise ValueError(msg)
+    return chunk.beams

@@ -12,7 +12,7 @@ from pydantic import Field
 from bentwing import _core
 from bentwing.base.array_spool import ArraySpool, columns_of
 from bentwing.base.settings import Settings
-from bentwing.map.chunk import MapChunk
+from bentwing.map.chunk import MapChunk, beams_of
 
 if TYPE_CHECKING:
     from collections.abc import Generator, Iterable
@@ -85,7 +85,7 @@ def clean(
             survey = survey or _survey(chunk, duration)
             survey.add(
                 chunk.points,
-                beams=_beams(chunk),
+                beams=beams_of(chunk),
                 ranges=chunk.ranges,
                 times=chunk.times,
                 doubtful=_doubtful(chunk),
@@ -121,7 +121,7 @@ def _cleaned(
     threads: int,
 ) -> MapChunk:
     incidence, thickness, moved, supported = cells.describe(
-        chunk.points, beams=_beams(chunk), threads=threads
+        chunk.points, beams=beams_of(chunk), threads=threads
     )
     chunk = replace(chunk, incidence=incidence, thickness=thickness)
     mixed = _doubtful(chunk) & ~supported if settings.mixed_pixels else np.zeros_like(moved)
@@ -130,13 +130,6 @@ def _cleaned(
     counts["map.moving"] += int(np.count_nonzero(moved))
     gone = mixed | moved
     return chunk.where(~gone) if gone.any() else chunk
-
-
-def _beams(chunk: MapChunk) -> NDArray[np.float32]:
-    if chunk.beams is None:
-        msg = "chunk.beams: expected the direction of every beam, got None"
-        raise ValueError(msg)
-    return chunk.beams
 
 
 def _doubtful(chunk: MapChunk) -> NDArray[np.bool_]:

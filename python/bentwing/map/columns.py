@@ -26,7 +26,13 @@ _OPTIONAL = {
 }
 
 
-def row_type(first: MapChunk, coordinate: str) -> np.dtype[np.void]:
+# Of the normals, under the names that each format has for them.
+NORMALS = ("normal_x", "normal_y", "normal_z")
+
+
+def row_type(
+    first: MapChunk, coordinate: str, normals: tuple[str, ...] = NORMALS
+) -> np.dtype[np.void]:
     """Packed little-endian row: x y z (of type `coordinate`), time, and what the chunk has.
 
     The angle of incidence is in degrees.
@@ -39,10 +45,12 @@ def row_type(first: MapChunk, coordinate: str) -> np.dtype[np.void]:
         ("range", "<f4"),
     ]
     fields += [(name, kind) for name, kind in _OPTIONAL.items() if getattr(first, name) is not None]
-    return np.dtype(fields)
+    return np.dtype(fields + further_fields(first, normals))
 
 
-def rows(chunk: MapChunk, dtype: np.dtype[np.void]) -> NDArray[np.void]:
+def rows(
+    chunk: MapChunk, dtype: np.dtype[np.void], normals: tuple[str, ...] = NORMALS
+) -> NDArray[np.void]:
     """Rows `(N,)` of a chunk; what it does not have is zero."""
     table = np.zeros(len(chunk), dtype)
     for axis, name in enumerate("xyz"):
@@ -52,7 +60,29 @@ def rows(chunk: MapChunk, dtype: np.dtype[np.void]) -> NDArray[np.void]:
         values = getattr(chunk, name)
         if values is not None and name in (dtype.names or ()):
             table[name] = np.degrees(values) if name == "incidence" else values
+    fill_further(table, chunk, normals)
     return table
+
+
+def further_fields(first: MapChunk, normals: tuple[str, ...] = NORMALS) -> list[tuple[str, str]]:
+    """Return the columns that are behind all else: normals, and fields of the recording."""
+    fields = [] if first.normals is None else [(name, "<f4") for name in normals]
+    own = None if first.attributes is None else first.attributes.dtype
+    if own is not None:
+        fields += [(name, own[name].newbyteorder("<").str) for name in own.names or ()]
+    return fields
+
+
+def fill_further(
+    table: NDArray[np.void], chunk: MapChunk, normals: tuple[str, ...] = NORMALS
+) -> None:
+    """Put these columns of a chunk into a table; what the chunk does not have stays as it is."""
+    if chunk.normals is not None and normals[0] in (table.dtype.names or ()):
+        for axis, name in enumerate(normals):
+            table[name] = chunk.normals[:, axis]
+    if chunk.attributes is not None:
+        for name in chunk.attributes.dtype.names or ():
+            table[name] = chunk.attributes[name]
 
 
 def fixed_length_header(build: Callable[[int, str], str], count: int) -> bytes:

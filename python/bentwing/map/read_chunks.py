@@ -12,6 +12,7 @@ import numpy as np
 from bentwing.base.errors import InputError
 from bentwing.base.gps_time import adjusted_gps_origin
 from bentwing.map.chunk import MapChunk
+from bentwing.map.columns import NORMALS
 from bentwing.map.las_bounds import require_sound_las
 from bentwing.map.write_las import EXTRA
 
@@ -84,8 +85,17 @@ class MapFile:
 
 
 def _chunk(part: Any, origin: float) -> MapChunk:  # noqa: ANN401 - the package has no types
-    names = set(part.point_format.extra_dimension_names)
-    extra = {name: np.array(part[name], kind) for name, (kind, _) in EXTRA.items() if name in names}
+    names = tuple(part.point_format.extra_dimension_names)
+    extra: dict[str, Any] = {
+        name: np.array(part[name], kind) for name, (kind, _) in EXTRA.items() if name in names
+    }
+    if NORMALS[0] in names:
+        extra["normals"] = np.stack([part[name] for name in NORMALS], axis=1)
+    further = [name for name in names if name not in {"range", *EXTRA, *NORMALS}]
+    if further:
+        extra["attributes"] = np.empty(len(part), [(n, part[n].dtype) for n in further])
+        for name in further:
+            extra["attributes"][name] = part[name]
     if "incidence" in extra:
         extra["incidence"] = np.radians(extra["incidence"])
     return MapChunk(

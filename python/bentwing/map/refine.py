@@ -12,7 +12,7 @@ import numpy as np
 from bentwing import _core
 from bentwing.base.array_spool import ArraySpool, columns_of
 from bentwing.base.memory import give_back
-from bentwing.map.chunk import MapChunk
+from bentwing.map.chunk import MapChunk, beams_of
 from bentwing.map.slabs import Extent
 from bentwing.recording.preprocess.read_ahead import read_ahead
 
@@ -70,7 +70,7 @@ def refine(
         spool = stack.enter_context(ArraySpool(folder))
         extent = Extent()
         for chunk in filter(len, chunks):
-            _beams(chunk)
+            beams_of(chunk)
             extent.add(chunk.points)
             spool.add(columns_of(chunk))
         slabs = extent.slabs(MOST_POINTS)
@@ -151,7 +151,7 @@ def _moved(
     for part in slabs.parts(chunk.points):
         found, own = next(moves[part.number]), part.rows[part.own]
         shift[own], sigma[own] = found["shift"], found["sigma"]
-    points = chunk.points + _beams(chunk) * shift[:, None].astype(np.float64)
+    points = chunk.points + beams_of(chunk) * shift[:, None].astype(np.float64)
     return replace(chunk, points=points, shift=shift, sigma=sigma)
 
 
@@ -196,10 +196,3 @@ def _median(histogram: NDArray[np.int64]) -> float | None:
     if not total:
         return None
     return _STEP * (int(np.searchsorted(np.cumsum(histogram), total / 2)) + 0.5)
-
-
-def _beams(chunk: MapChunk) -> NDArray[np.float32]:
-    if chunk.beams is None:
-        msg = "chunk.beams: expected the direction of every beam, got None"
-        raise ValueError(msg)
-    return chunk.beams

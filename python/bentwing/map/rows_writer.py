@@ -6,7 +6,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from typing import TYPE_CHECKING, ClassVar
 
-from bentwing.map.columns import fixed_length_header, row_type, rows
+from bentwing.map.columns import NORMALS, fixed_length_header, row_type, rows
 from bentwing.map.writer import MapWriter
 
 if TYPE_CHECKING:
@@ -17,14 +17,15 @@ class RowsWriter(MapWriter):
     """Writer of rows; `time` is in s since the recording's start, whose stamp is in a comment."""
 
     coordinates: ClassVar[str]  # type of x, y and z
+    normals: ClassVar[tuple[str, ...]] = NORMALS  # names of their columns
 
     def _begin(self, first: MapChunk) -> None:
-        self._dtype = row_type(first, self.coordinates)
+        self._dtype = row_type(first, self.coordinates, self.normals)
         self._file = self._temporary.open("wb")
         self._file.write(self._header())
 
     def _append(self, chunk: MapChunk) -> None:
-        self._file.write(rows(chunk, self._dtype).tobytes())
+        self._file.write(rows(chunk, self._dtype, self.normals).tobytes())
 
     def _finish(self) -> None:
         self._file.seek(0)

@@ -12,6 +12,7 @@ from laspy.vlrs.known import LasZipVlr, WktCoordinateSystemVlr
 
 from bentwing import _core
 from bentwing.base.gps_time import adjusted_gps_origin
+from bentwing.map.columns import NORMALS, fill_further, further_fields
 from bentwing.map.writer import MapWriter, round_offset
 
 if TYPE_CHECKING:
@@ -32,6 +33,9 @@ EXTRA: dict[str, tuple[type[np.generic], str]] = {
     "sigma": (np.float32, "m, 1 sigma along the beam"),
     "run_id": (np.uint16, "number of the run"),
 }
+_NORMALS = {name: f"of the surface, {axis}, to the lidar" for axis, name in zip("xyz", NORMALS, strict=True)}
+# Normals are stored in steps of 0.03 degrees: further digits mean nothing, and do not compress.
+_STEPS = 2048.0
 # What the records are made of beside the points.
 _COLUMNS: dict[str, type[np.generic]] = {
     "times": np.float64,
@@ -61,6 +65,7 @@ class LasWriter(MapWriter):
     def _announce(self, first: MapChunk) -> None:
         """Decide what the records have."""
         self._header = _header(first, self.crs_wkt)
+        self._further = np.dtype(further_fields(first))
         self._intensity_scale = _intensity_scale(first)
 
     def _append(self, chunk: MapChunk) -> None:
@@ -87,6 +92,10 @@ class LasWriter(MapWriter):
             intensity_scale=self._intensity_scale,
             **columns,
         )
+        if self._further.names:
+            further = _further(chunk, self._further)
+            own = records.reshape(len(chunk), -1)
+            records = np.hstack([own, further.view(np.uint8).reshape(len(chunk), -1)]).reshape(-1)
         table: NDArray[np.void] = records.view(point_format.dtype())
         return table
 
@@ -182,9 +191,20 @@ def _header(first: MapChunk, crs_wkt: str | None) -> laspy.LasHeader:
     for name, (kind, description) in EXTRA.items():
         if getattr(first, name) is not None:
             header.add_extra_dim(laspy.ExtraBytesParams(name, kind, description))
+    for name, type_ in further_fields(first):
+        header.add_extra_dim(laspy.ExtraBytesParams(name, type_, _NORMALS.get(name, "")))
     if crs_wkt is not None:
         header.vlrs.append(WktCoordinateSystemVlr(crs_wkt))
     return header
+
+
+def _further(chunk: MapChunk, dtype: np.dtype[np.void]) -> NDArray[np.void]:
+    """Return what the records (N,) have behind all that every map may have."""
+    table = np.zeros(len(chunk), dtype)
+    fill_further(table, chunk)
+    for name in _NORMALS.keys() & set(dtype.names or ()):
+        table[name] = np.rint(table[name] * _STEPS) / _STEPS
+    return table
 
 
 def _column(chunk: MapChunk, name: str, kind: type[np.generic]) -> NDArray[Any] | None:

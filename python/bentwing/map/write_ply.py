@@ -7,13 +7,18 @@ from typing import ClassVar
 
 from bentwing.map.rows_writer import RowsWriter
 
-_TYPES = {"<f8": "double", "<f4": "float", "<u2": "ushort"}
+# Eight bytes long there are no whole numbers.
+_TYPES = {
+    "<f8": "double", "<f4": "float", "|u1": "uchar", "|i1": "char", "<u2": "ushort", "<i2": "short",
+    "<u4": "uint", "<i4": "int",
+}  # fmt: skip
 
 
 class PlyWriter(RowsWriter):
     """Writer of PLY."""
 
     coordinates: ClassVar[str] = "<f8"
+    normals: ClassVar[tuple[str, ...]] = ("nx", "ny", "nz")
 
     def _text(self, count: int, filling: str) -> str:
         names = self._dtype.names or ()

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bentwing.base.trajectory import Trajectory
+    from bentwing.map.chunk import MapChunk
 
 _ROUND = 100.0  # m, of the place that coordinates are relative to
 _STAMPS = 1e-6  # s; those of files are rounded
@@ -64,6 +65,12 @@ class FinishedMap:
                 found[covered, axis] = np.interp(times[covered], way.times, way.positions[:, axis])
         found[n_ways != 1] = np.nan
         return found
+
+    def beams_of(self, chunk: MapChunk) -> NDArray[np.float64]:
+        """Return the unit directions (N, 3) from the sensor to the points of a chunk; NaN as `sensors_at`."""
+        beams = chunk.points - self.sensors_at(chunk.times)
+        beams /= np.maximum(np.linalg.norm(beams, axis=1, keepdims=True), 1e-9)
+        return beams
 
 
 def open_map_of(folder: Path | str) -> FinishedMap:

@@ -14,11 +14,12 @@ from bentwing.base.errors import InputError, UsageError
 from bentwing.base.new_file import require_new
 from bentwing.base.progress import Progress
 from bentwing.base.value import Value
+from bentwing.map.normals import SPACING
 from bentwing.products.finished_map import open_map_of
 from bentwing.products.mesh_files import MESH_SUFFIXES, write_triangles
 from bentwing.products.names import MeshColour
 from bentwing.products.open3d_package import require_open3d
-from bentwing.products.oriented import SPACING, orient
+from bentwing.products.oriented import orient
 from bentwing.report.colours import HEIGHT
 from bentwing.report.colours import colour as colour_of
 

@@ -63,7 +63,11 @@ def to_open3d(given: Path | str | MapChunk | OrientedPoints | Trajectory) -> Any
         columns = {"normals": given.normals.astype(np.float32), "intensity": given.intensity}
         return _cloud(o3d, given.points, columns)
     chunk = given if isinstance(given, MapChunk) else _whole(given)
-    return _cloud(o3d, chunk.points, {n: getattr(chunk, field) for n, field in _COLUMNS.items()})
+    columns = {n: getattr(chunk, field) for n, field in _COLUMNS.items()}
+    attributes = chunk.attributes
+    if attributes is not None:
+        columns |= {name: attributes[name] for name in attributes.dtype.names or ()}
+    return _cloud(o3d, chunk.points, columns)
 
 
 def from_open3d(geometry: Any) -> MapChunk | Trajectory:  # noqa: ANN401 - Open3D has no types

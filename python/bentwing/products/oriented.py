@@ -7,31 +7,27 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from bentwing.base.errors import InputError, UsageError
-from bentwing.base.moments import Planes
 from bentwing.base.progress import Progress
 from bentwing.base.value import Value
+from bentwing.map.normals import SPACING, find_normals
+from bentwing.map.voxel_views import VoxelViews
 from bentwing.products.finished_map import open_map_of
 from bentwing.products.map_chunks import chunks_of
-from bentwing.products.views import VoxelViews
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from numpy.typing import NDArray
 
+    from bentwing.map.chunk import MapChunk
+    from bentwing.map.voxel_views import Views
     from bentwing.products.finished_map import FinishedMap
-    from bentwing.products.views import Views
 
     Array = NDArray[np.float64]
 
-SPACING = 0.05  # m
-_NEIGHBOURS = 16
-_FEWEST = 6  # of them, the point among them, that say where a surface lies
-_REACH = 4.0  # spacings, to the farthest of them
-_TOGETHER = 100_000  # points whose neighbours are in memory at once
+_AGREEING = 0.5  # length of the mean of a voxel's normals; of both sides of a wall it is shorter
 _SMALLEST = 0.001  # m; voxels of less than a millimetre hold less than a point each
 
 
@@ -87,10 +83,12 @@ def orient(source: FinishedMap, spacing: float, progress: Progress) -> OrientedP
         raise UsageError(msg)
     gathered = VoxelViews(spacing)
     with progress.stage("thinning the map"):
+        has_normals = False
         for chunk in chunks_of(source):
-            sensors = source.sensors_at(chunk.times)
-            seen = np.isfinite(sensors[:, 0])
-            gathered.add(chunk.where(seen), sensors[seen])
+            has_normals = chunk.normals is not None
+            towards = _towards(source, chunk)
+            seen = np.isfinite(towards[:, 0])
+            gathered.add(chunk.where(seen), towards[seen])
     views = gathered.result()
     if views is None:
         msg = (
@@ -99,7 +97,8 @@ def orient(source: FinishedMap, spacing: float, progress: Progress) -> OrientedP
         )
         raise InputError(msg)
     with progress.stage("finding normals"):
-        normals, known = find_normals(views, gathered.edge)
+        found = _means(views) if has_normals else find_normals(views, gathered.edge)
+    normals, known = found
     if not known.any():
         msg = f"{source.path}: its points lie on no surface; give a larger --spacing"
         raise InputError(msg)
@@ -107,34 +106,14 @@ def orient(source: FinishedMap, spacing: float, progress: Progress) -> OrientedP
     return OrientedPoints(views.points[known], normals[known], intensity, gathered.edge)
 
 
-def find_normals(views: Views, spacing: float) -> tuple[Array, NDArray[np.bool_]]:
-    """Return normals (K, 3) towards the sensor, and where enough neighbours say which (K,).
-
-    Neighbours that were seen from the opposite direction are of the other side of a thin wall.
-    """
-    tree = cKDTree(views.points)
-    normals, known = np.empty_like(views.points), np.empty(len(views.points), np.bool_)
-    for first in range(0, len(normals), _TOGETHER):
-        rows = slice(first, first + _TOGETHER)
-        normals[rows], known[rows] = _normals(tree, views, rows, _REACH * spacing)
-    return normals, known
+def _towards(source: FinishedMap, chunk: MapChunk) -> Array:
+    """Return the normals (N, 3) of a map that has them, else the directions to the sensor; NaN where unknown."""
+    if chunk.normals is not None:
+        return chunk.normals.astype(np.float64)
+    return -source.beams_of(chunk)
 
 
-def _normals(
-    tree: cKDTree, views: Views, rows: slice, reach: float
-) -> tuple[Array, NDArray[np.bool_]]:
-    points, towards = views.points[rows], views.towards[rows]
-    distances, near = tree.query(points, _NEIGHBOURS, distance_upper_bound=reach)
-    there = np.isfinite(distances)
-    near = np.where(there, near, 0)
-    there &= np.einsum("nki,ni->nk", views.towards[near], towards) > 0.0
-    n = there.sum(axis=1)
-    offsets = np.where(there[..., None], views.points[near] - points[:, None], 0.0)
-    share = 1.0 / np.maximum(n, 1)
-    centred = offsets - (offsets.sum(axis=1) * share[:, None])[:, None]
-    centred[~there] = 0.0
-    covariances = np.einsum("nki,nkj->nij", centred, centred) * share[:, None, None]
-    normals = Planes.of(covariances).normals
-    away = np.einsum("ni,ni->n", normals, towards) < 0.0
-    normals[away] *= -1.0
-    return normals, n >= _FEWEST
+def _means(views: Views) -> tuple[Array, NDArray[np.bool_]]:
+    """Return the normals (K, 3) of voxels by those of their points, and where these agree (K,)."""
+    lengths = np.linalg.norm(views.towards, axis=1)
+    return views.towards / np.maximum(lengths, 1e-9)[:, None], lengths > _AGREEING

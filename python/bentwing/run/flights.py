@@ -67,6 +67,7 @@ def map_flights(
         map_spacing=settings.map_spacing,
         cleaning=settings.cleaning,
         refine=settings.refine,
+        normals=settings.normals,
         georeferencing=settings.georeferencing,
         project=settings.project,
         threads=settings.threads,

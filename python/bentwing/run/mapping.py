@@ -16,6 +16,7 @@ from bentwing.base.trajectory import Trajectory
 from bentwing.evaluate.revisits import revisit_consistency
 from bentwing.map.chunk import untimed
 from bentwing.map.clean import clean
+from bentwing.map.normals import moved, with_normals
 from bentwing.map.refine import refine
 from bentwing.map.sample import MapSample
 from bentwing.map.thin import thin
@@ -104,11 +105,13 @@ def write_map(
             chunks = refine(
                 ahead(chunks), folder.path, counts=counts, record=refined, threads=settings.threads
             )
+        if settings.normals:
+            chunks = with_normals(ahead(chunks), folder.path, threads=settings.threads)
         kept = ahead(sample.watch(thin(chunks, settings.map_spacing, counts)))
         writer = stack.enter_context(_open(path, settings, origin_ns, placed))
         for chunk in kept:
             timed = with_own_times(chunk, late)
-            writer.write(replace(timed, points=_projected(chunk.points, placed)))
+            writer.write(timed if placed is None else moved(timed, placed.to_projected))
     give_back()  # what is compared now is as much again
     counts["map.written"] = writer.n_points
     points = sample.points

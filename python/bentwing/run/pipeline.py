@@ -50,6 +50,7 @@ def map_recording(
     map_spacing: float | None = None,
     cleaning: CleanSettings | None = None,
     refine: bool = True,
+    normals: bool | None = None,
     georeferencing: GeoreferenceSettings | None = None,
     project: Project | Path | str | None = None,
     loop_closure: bool = True,
@@ -77,6 +78,7 @@ def map_recording(
     map_spacing : m, edge of the voxels that keep one point each; default: 0, which keeps all points
     cleaning : what the map leaves out; default: mixed pixels and what moved
     refine : whether points are moved along their beams to the surface that they measured together
+    normals : whether points have the normal of their surface, towards the lidar; default: no
     georeferencing : how GNSS fixes and control points are used; default: fixes, where the payload
         names their topic, as a rigid fit
     project : what the first page of the report names, or a YAML file of it; default: the payload's
@@ -107,6 +109,7 @@ def map_recording(
         map_spacing=map_spacing,
         cleaning=cleaning,
         refine=None if refine else False,
+        normals=normals,
         georeferencing=georeferencing,
         project=as_project(project),
         loop_closure=None if loop_closure else False,

@@ -59,6 +59,10 @@ class MapSettings(Settings):
         description="whether points are moved along their beams to the surface that they measured "
         "together; turn off for the returns as they are",
     )
+    normals: bool = Field(
+        default=False,
+        description="whether points have the normal of their surface, towards the lidar",
+    )
     georeferencing: GeoreferenceSettings = Field(
         default=GeoreferenceSettings(), description="how GNSS fixes and control points are used"
     )

@@ -8,11 +8,10 @@ import pytest
 
 from bentwing.base.errors import InputError, UsageError
 from bentwing.base.trajectory import Trajectory
-from bentwing.base.voxels import cells_of, voxel_keys
+from bentwing.base.voxels import voxel_keys
 from bentwing.map.chunk import MapChunk
 from bentwing.products import from_open3d, mesh_of, oriented_points, to_open3d, write_mesh
 from bentwing.products.mesh_files import write_triangles
-from bentwing.products.views import VoxelViews
 from support.known_points import START_NS, write_run
 
 THERE = np.array([640_500.0, 5_333_200.0, 200.0])
@@ -65,23 +64,6 @@ def test_sides_of_a_thin_plate_have_opposite_normals(tmp_path):
     side = np.sign(found.points[:, 0])
     right = (found.normals[:, 0] * side) > np.cos(0.3)
     assert right.mean() > 0.98
-
-
-def test_voxels_double_where_there_would_be_too_many():
-    points = ball()
-    gathered = VoxelViews(0.05, most=2000)
-    for part in np.array_split(points, 7):
-        chunk = MapChunk(part, np.zeros(len(part)), np.zeros(len(part), np.float32))
-        gathered.add(chunk, np.zeros((len(part), 3)))
-    views = gathered.result()
-    assert gathered.edge == 0.2
-    assert len(views.points) <= 2000
-    once = VoxelViews(0.2)
-    whole = MapChunk(points, np.zeros(len(points)), np.zeros(len(points), np.float32))
-    once.add(whole, np.zeros((len(points), 3)))
-    assert np.allclose(once.result().points, views.points, atol=1e-9)
-    assert np.allclose(once.result().towards, views.towards, atol=1e-9)
-    assert len(np.unique(cells_of(points, 0.2), axis=0)) == len(views.points)
 
 
 def test_points_that_nobody_saw_have_no_normals(tmp_path):

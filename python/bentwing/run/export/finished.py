@@ -115,6 +115,11 @@ class Finished:
         return bool(self.run.record["settings"].get("refine"))
 
     @property
+    def has_normals(self) -> bool:
+        """Whether the map's points have normals."""
+        return bool(self.run.record["settings"].get("normals"))
+
+    @property
     def map_name(self) -> str | None:
         """Name of the map's file; None for a run without one."""
         return next((name for name in self.run.record["files"] if name.startswith("map.")), None)

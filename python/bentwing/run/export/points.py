@@ -15,8 +15,10 @@ from bentwing.base.errors import BentwingError, UsageError
 from bentwing.base.progress import as_progress
 from bentwing.map.clean import clean
 from bentwing.map.crop import Crop, Cropper
+from bentwing.map.normals import moved, with_normals
 from bentwing.map.refine import refine
 from bentwing.map.thin import thin
+from bentwing.products.finished_map import open_map_of
 from bentwing.run.export.area import area_in
 from bentwing.run.export.coordinates import same
 from bentwing.run.mapping import clock_of, in_turn, joined_trajectory, with_own_times
@@ -29,6 +31,7 @@ if TYPE_CHECKING:
     from bentwing.map.chunk import MapChunk
     from bentwing.map.clean import CleanSettings
     from bentwing.map.read_chunks import MapFile
+    from bentwing.products.finished_map import FinishedMap
     from bentwing.run.export.coordinates import Change, Target
     from bentwing.run.export.finished import Finished
     from bentwing.run.merging.source import Source
@@ -47,6 +50,7 @@ class ExportOptions:
     keep_mixed : whether returns between two surfaces are kept; None for what the map does
     refine : whether points are moved along their beams to the surface that they measured together; None for
         what the map does
+    normals : whether points have the normal of their surface, towards the lidar; None for what the map does
     epsg : projected system; None for that of the map
     local : whether coordinates are in the frame of the trajectory
     """
@@ -57,6 +61,7 @@ class ExportOptions:
     keep_moving: bool | None = None
     keep_mixed: bool | None = None
     refine: bool | None = None
+    normals: bool | None = None
     epsg: int | None = None
     local: bool = False
 
@@ -82,6 +87,10 @@ class ExportOptions:
     def refines(self, run: Finished) -> bool:
         """Whether points are refined, where those of the run's map may be."""
         return run.refines if self.refine is None else self.refine
+
+    def has_normals(self, run: Finished) -> bool:
+        """Whether points have normals, where those of the run's map may."""
+        return run.has_normals if self.normals is None else self.normals
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,10 +160,10 @@ class Points:
         with self._read(folder, threads, as_progress(progress), counts) as (read, change, to_path):
             if near:
                 read = Cropper(near, self._run.path, to_path).chunks(read, counts)
-            moved = (replace(chunk, points=change(chunk.points)) for chunk in read)
+            changed: Iterator[MapChunk] = (moved(chunk, change) for chunk in read)
             if rest:
-                moved = Cropper(rest).chunks(moved, counts)
-            yield from thin(moved, self._spacing(), counts)
+                changed = Cropper(rest).chunks(changed, counts)
+            yield from thin(changed, self._spacing(), counts)
 
     def _spacing(self) -> float:
         """Return the edge of the voxels to thin with; a map is not thinned twice with the same ones.
@@ -179,6 +188,10 @@ class Points:
         stored = self._source
         with progress.stage("export", stored.n_points, "points") as shown:
             read = _shown(stored.chunks(self._run.run.start_ns), shown.advance)
+            if self._options.has_normals(self._run) and not self._run.has_normals:
+                read = with_normals(_seen(read, open_map_of(self._run.run.folder)), folder, threads=threads)
+            elif not self._options.has_normals(self._run):
+                read = (replace(chunk, normals=None) for chunk in read)
             yield read, self.target.from_map, self._run.coordinates.nearly_local
 
 
@@ -253,6 +266,8 @@ def _again(  # noqa: PLR0917 - private, called once
     )
     if options.refines(run):
         cleaned = refine(cleaned, folder, counts=counts, threads=threads)
+    if options.has_normals(run):
+        cleaned = with_normals(cleaned, folder, threads=threads)
     for chunk in cleaned:
         yield with_own_times(chunk, late)
 
@@ -262,6 +277,15 @@ def _duration(sources: list[Source]) -> float:
         return float(joined_trajectory([source.estimate for source in sources]).times[-1])
     with sources[0].part() as part:
         return part.length
+
+
+def _seen(
+    chunks: Iterator[MapChunk], source: FinishedMap
+) -> Iterator[MapChunk]:
+    """Give the points of a map the directions in which the sensor saw them; NaN where unknown."""
+    for chunk in chunks:
+        near = replace(chunk, points=chunk.points - source.origin)
+        yield replace(chunk, beams=source.beams_of(near).astype(np.float32))
 
 
 def _shown(

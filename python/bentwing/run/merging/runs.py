@@ -61,6 +61,7 @@ def merge(
     map_spacing: float = 0.0,
     cleaning: CleanSettings | None = None,
     refine: bool = True,
+    normals: bool = False,
     georeferencing: GeoreferenceSettings | None = None,
     project: Project | Path | str | None = None,
     threads: int | None = None,
@@ -81,6 +82,8 @@ def merge(
     map_spacing : m, edge of the voxels that keep one point each; 0 keeps all points
     cleaning : what is left out of the map; default: mixed pixels and what moved, while a run was
         flown or between the runs
+    refine : whether points are moved along their beams to the surface that they measured together
+    normals : whether points have the normal of their surface, towards the lidar
     georeferencing : how the GNSS fixes of all runs and control points are used; what is not given is
         as in the runs, where they agree
     project : what the first page of the report names, or a YAML file of it; default: the first run's
@@ -96,6 +99,7 @@ def merge(
         map_spacing=map_spacing,
         cleaning=cleaning or CleanSettings(),
         refine=refine,
+        normals=normals,
         georeferencing=georeferencing or GeoreferenceSettings(),
         project=as_project(project),
         threads=threads,

@@ -29,11 +29,13 @@ class Views(Value):
     ----------
     points : (K, 3) m
     towards : (K, 3) mean of the unit directions from the points to the sensor
+    keys : (K,) of the voxels, increasing
     intensity : (K,) mean; None where no point has any
     """
 
     points: NDArray[np.float64]
     towards: NDArray[np.float64]
+    keys: NDArray[np.int64]
     intensity: NDArray[np.float64] | None
 
 
@@ -51,10 +53,8 @@ class VoxelViews:
         self._most = most
         self._sums = KeySums()
 
-    def add(self, chunk: MapChunk, sensors: NDArray[np.float64]) -> None:
-        """Add points that were seen from sensors (N, 3) m."""
-        towards = sensors - chunk.points
-        towards /= np.maximum(np.linalg.norm(towards, axis=1, keepdims=True), 1e-9)
+    def add(self, chunk: MapChunk, towards: NDArray[np.float64]) -> None:
+        """Add points with the unit directions (N, 3) to the sensor, or those of their normals."""
         cells = cells_of(chunk.points, self.edge)
         # relative to the centres of the voxels, so that sums keep their precision
         local = chunk.points - centres_of(cells, self.edge)
@@ -72,7 +72,7 @@ class VoxelViews:
         means = sums[:, 1:] / sums[:, :1]
         points = centres_of(unpack(keys), self.edge) + means[:, :3]
         intensity = means[:, 6] if means[:, 6].any() else None
-        return Views(points, means[:, 3:6], intensity)
+        return Views(points, means[:, 3:6], keys, intensity)
 
     def _coarsen(self) -> None:
         """Double the edge, so that eight voxels become one."""

@@ -8,7 +8,7 @@ import typer
 
 from bentwing.base.errors import UsageError
 from bentwing.cli import options
-from bentwing.cli.options import EARTH, MAP, RESULT, option
+from bentwing.cli.options import EARTH, MAP, RESULT, names, option
 from bentwing.map.formats import MapFormat
 from bentwing.run.export.names import TrajectoryFormat
 
@@ -117,6 +117,15 @@ def command(
             help="Whether to move points to the surface that they measured together.",
         ),
     ] = None,
+    attributes: Annotated[
+        str | None,
+        option(
+            MAP,
+            metavar="NAME,NAME...",
+            show_default="those of the map",
+            help="Carry these further fields of the lidar's points.",
+        ),
+    ] = None,
     normals: Annotated[
         bool | None,
         option(
@@ -160,6 +169,7 @@ def command(
         keep_mixed=keep_mixed,
         refine=refine,
         normals=normals,
+        attributes=names(attributes),
         epsg=epsg,
         local=local,
     )

@@ -64,6 +64,9 @@ def _sensors(inspection: Inspection) -> Iterator[RenderableType]:
     made = any((inspection.point_times or "") in warning for warning in inspection.warnings)
     if inspection.point_times is not None and not made:  # a warning says all of it
         yield f"times      {escape(inspection.point_times)}"
+    if inspection.fields:
+        fields = ", ".join(f"{name} ({kind})" for name, kind in inspection.fields.items())
+        yield f"fields     {escape(fields)}"
     for number, (role, clock) in enumerate(inspection.clocks.items()):
         yield f"{'' if number else 'clocks':10} {escape(role)} {escape(clock)}"
     if inspection.spin is not None:

@@ -33,6 +33,7 @@ def command(
     keep_mixed: options.KeepMixed = False,
     no_refine: options.NoRefine = False,
     normals: options.Normals = False,
+    attributes: options.Attributes = None,
     georeference: options.Georeference = None,
     epsg: options.Epsg = None,
     gnss: options.Gnss = None,
@@ -110,6 +111,8 @@ def command(
         force=True if force else None,
     )
     chosen = choose(settings, set_, payload, options_given)
+    if (carried := options.names(attributes)) is not None:
+        chosen = chosen.carrying(carried)
     if print_settings:
         typer.echo(chosen.to_yaml(), nl=False)
         return
@@ -121,7 +124,12 @@ def command(
         from bentwing.fleet.plan import Choice
         from bentwing.fleet.site import map_site
 
-        of_one = {"--write-payload": write_payload, "--loops": loops, "--gnss": gnss}
+        of_one: dict[str, object] = {
+            "--write-payload": write_payload,
+            "--loops": loops,
+            "--gnss": gnss,
+            "--attributes": attributes,
+        }
         for name in (name for name, file in of_one.items() if file is not None):
             msg = f"{name} with a folder of recordings: give it with one recording"
             raise UsageError(msg)

@@ -52,6 +52,11 @@ def out_file(help_line: str) -> Any:  # noqa: ANN401 - typer's own
     return option(RESULT, "--out", "-o", metavar="FILE", help=help_line)
 
 
+def names(text: str | None) -> tuple[str, ...] | None:
+    """Return names with commas between them."""
+    return None if text is None else tuple(word.strip() for word in text.split(",") if word.strip())
+
+
 def cleaning(*, keep_mixed: bool, keep_moving: bool) -> dict[str, bool]:
     """Return what the map keeps, where that differs from the settings."""
     kept = {"mixed_pixels": keep_mixed, "moving": keep_moving}
@@ -148,8 +153,14 @@ NoRefine = Annotated[
 ]
 Normals = Annotated[
     bool,
+    option(MAP, "--normals", help="Give points the normal of their surface, towards the lidar."),
+]
+Attributes = Annotated[
+    str | None,
     option(
-        MAP, "--normals", help="Give points the normal of their surface, towards the lidar."
+        MAP,
+        metavar="NAME,NAME...",
+        help="Carry these further fields of the lidar's points, which `bentwing info` lists.",
     ),
 ]
 KeepMixed = Annotated[bool, option(MAP, "--keep-mixed", help="Keep returns between two surfaces.")]

@@ -166,7 +166,15 @@ def _merged(site: Site, choice: Choice, pool: LazyPool) -> Site:
     if len(usable) < 2:
         return replace(site, groups=alone)
     settings = choice.settings()
-    named = ("map_format", "map_spacing", "cleaning", "refine", "normals", "georeferencing", "project")
+    named = (
+        "map_format",
+        "map_spacing",
+        "cleaning",
+        "refine",
+        "normals",
+        "georeferencing",
+        "project",
+    )
     wanted = {name: getattr(settings, name) for name in settings.model_fields_set & {*named}}
     merging = merge_settings(**wanted, loop_closure=settings.closing)
     budget = Budget.of(sum(one.seconds for one in usable), merging.loop_closure)

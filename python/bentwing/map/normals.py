@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 SPACING = 0.05  # m
 _NEIGHBOURS = 16
 _FEWEST = 6  # of them, the point among them, that say where a surface lies
+_ENOUGH = 10.0  # points of a voxel, beyond which its mean gets no better by more
 _REACH = 4.0  # spacings, to the farthest of them
 _TOGETHER = 100_000  # points whose neighbours are in memory at once
 _STEP = 1.0  # m along a normal, which says where it points in other coordinates
@@ -53,10 +54,10 @@ def with_normals(
     The chunks with `normals`, NaN where too few points around say how the surface lies.
     """
     gathered = VoxelViews(SPACING)
-    origin: Array | None = None  # of projected coordinates, which are too large for voxels
+    origin = np.zeros(3)  # of projected coordinates, which are too large for voxels
     with ArraySpool(folder) as spool:
-        for chunk in filter(len, chunks):
-            origin = round_offset(chunk.points) if origin is None else origin
+        for number, chunk in enumerate(filter(len, chunks)):
+            origin = origin if number else round_offset(chunk.points)
             towards = -beams_of(chunk).astype(np.float64)
             seen = np.isfinite(towards[:, 0])
             near = replace(chunk, points=chunk.points - origin)
@@ -109,22 +110,20 @@ def _normals(
     tree: cKDTree, views: Views, rows: slice, reach: float, threads: int
 ) -> tuple[Array, NDArray[np.bool_]]:
     points, towards = views.points[rows], views.towards[rows]
-    distances, near = tree.query(
-        points, _NEIGHBOURS, distance_upper_bound=reach, workers=threads
-    )
+    distances, near = tree.query(points, _NEIGHBOURS, distance_upper_bound=reach, workers=threads)
     there = np.isfinite(distances)
     near = np.where(there, near, 0)
     there &= np.einsum("nki,ni->nk", views.towards[near], towards) > 0.0
-    n = there.sum(axis=1)
+    # A voxel that the surface only touches has few points, whose mean is as uncertain.
+    weights = np.where(there, np.minimum(views.counts[near], _ENOUGH), 0.0)
+    weights /= np.maximum(weights.sum(axis=1), 1e-9)[:, None]
     offsets = np.where(there[..., None], views.points[near] - points[:, None], 0.0)
-    share = 1.0 / np.maximum(n, 1)
-    centred = offsets - (offsets.sum(axis=1) * share[:, None])[:, None]
-    centred[~there] = 0.0
-    covariances = np.einsum("nki,nkj->nij", centred, centred) * share[:, None, None]
+    centred = offsets - np.einsum("nk,nki->ni", weights, offsets)[:, None]
+    covariances = np.einsum("nk,nki,nkj->nij", weights, centred, centred, optimize=True)
     normals = Planes.of(covariances).normals
     away = np.einsum("ni,ni->n", normals, towards) < 0.0
     normals[away] *= -1.0
-    return normals, n >= _FEWEST
+    return normals, there.sum(axis=1) >= _FEWEST
 
 
 def moved(chunk: MapChunk, change: Callable[[Array], Array]) -> MapChunk:

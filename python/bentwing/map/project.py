@@ -76,6 +76,7 @@ def project(
                 beams,
                 mixed_pixels(batch.points, lengths, batch.times, batch.ring),
                 run_id=np.zeros(len(ranges), np.uint16),
+                attributes=batch.attributes,
             )
 
 

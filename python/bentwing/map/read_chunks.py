@@ -17,7 +17,7 @@ from bentwing.map.las_bounds import require_sound_las
 from bentwing.map.write_las import EXTRA
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -36,12 +36,14 @@ class MapFile:
     path : the file
     n_points : in it
     low, high : (3,) m, corners of the box around the points
+    attributes : names of further fields of the recording
     """
 
     path: Path
     n_points: int
     low: NDArray[np.float64]
     high: NDArray[np.float64]
+    attributes: tuple[str, ...]
 
     @classmethod
     def open(cls, path: Path) -> MapFile:
@@ -55,12 +57,14 @@ class MapFile:
         require_sound_las(path)
         with laspy.open(path) as file:
             header = file.header
-            if "range" not in header.point_format.extra_dimension_names:
+            names = [*header.point_format.extra_dimension_names]
+            if "range" not in names:
                 msg = (
                     f"{path}: has no ranges, so bentwing did not write it; map the recording again"
                 )
                 raise InputError(msg)
-            return cls(path, header.point_count, np.array(header.mins), np.array(header.maxs))
+            ends = np.array(header.mins), np.array(header.maxs)
+            return cls(path, header.point_count, *ends, _further(names))
 
     def chunks(self, clock_origin_ns: int) -> Iterator[MapChunk]:
         """Yield the points with their attributes.
@@ -91,8 +95,7 @@ def _chunk(part: Any, origin: float) -> MapChunk:  # noqa: ANN401 - the package 
     }
     if NORMALS[0] in names:
         extra["normals"] = np.stack([part[name] for name in NORMALS], axis=1)
-    further = [name for name in names if name not in {"range", *EXTRA, *NORMALS}]
-    if further:
+    if further := _further(names):
         extra["attributes"] = np.empty(len(part), [(n, part[n].dtype) for n in further])
         for name in further:
             extra["attributes"][name] = part[name]
@@ -105,3 +108,8 @@ def _chunk(part: Any, origin: float) -> MapChunk:  # noqa: ANN401 - the package 
         np.array(part.intensity, np.float32),
         **extra,
     )
+
+
+def _further(names: Iterable[str]) -> tuple[str, ...]:
+    """Return those of the extra dimensions that are fields of the recording."""
+    return tuple(name for name in names if name not in {"range", *EXTRA, *NORMALS})

@@ -30,12 +30,14 @@ class Views(Value):
     points : (K, 3) m
     towards : (K, 3) mean of the unit directions from the points to the sensor
     keys : (K,) of the voxels, increasing
+    counts : (K,) points in them
     intensity : (K,) mean; None where no point has any
     """
 
     points: NDArray[np.float64]
     towards: NDArray[np.float64]
     keys: NDArray[np.int64]
+    counts: NDArray[np.float64]
     intensity: NDArray[np.float64] | None
 
 
@@ -72,7 +74,7 @@ class VoxelViews:
         means = sums[:, 1:] / sums[:, :1]
         points = centres_of(unpack(keys), self.edge) + means[:, :3]
         intensity = means[:, 6] if means[:, 6].any() else None
-        return Views(points, means[:, 3:6], keys, intensity)
+        return Views(points, means[:, 3:6], keys, sums[:, 0], intensity)
 
     def _coarsen(self) -> None:
         """Double the edge, so that eight voxels become one."""

@@ -33,7 +33,9 @@ EXTRA: dict[str, tuple[type[np.generic], str]] = {
     "sigma": (np.float32, "m, 1 sigma along the beam"),
     "run_id": (np.uint16, "number of the run"),
 }
-_NORMALS = {name: f"of the surface, {axis}, to the lidar" for axis, name in zip("xyz", NORMALS, strict=True)}
+_NORMALS = {
+    name: f"of the surface, {axis}, to the lidar" for axis, name in zip("xyz", NORMALS, strict=True)
+}
 # Normals are stored in steps of 0.03 degrees: further digits mean nothing, and do not compress.
 _STEPS = 2048.0
 # What the records are made of beside the points.

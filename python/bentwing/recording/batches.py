@@ -30,6 +30,7 @@ class LidarBatch(Value):
     ring : (N,) uint16 or None, beam number of a multi-beam lidar
     angles : (N,) float64 or None, rad, angle of the motor that turns the lidar at each point's
         time, unwrapped; set by preprocess
+    attributes : (N,) structured or None, further fields that the payload asks for
     """
 
     points: NDArray[np.float64]
@@ -37,16 +38,19 @@ class LidarBatch(Value):
     intensity: NDArray[np.float32] | None = None
     ring: NDArray[np.uint16] | None = None
     angles: NDArray[np.float64] | None = None
+    attributes: NDArray[np.void] | None = None
 
     def where(self, keep: NDArray[np.bool_] | NDArray[np.intp] | slice) -> LidarBatch:
         """Return the returns selected by a mask, by indices or by a slice."""
         chosen, intensity, ring, angles = numbered(keep), self.intensity, self.ring, self.angles
+        attributes = self.attributes
         return LidarBatch(
             rows(self.points, chosen),
             rows(self.times, chosen),
             None if intensity is None else rows(intensity, chosen),
             None if ring is None else rows(ring, chosen),
             None if angles is None else rows(angles, chosen),
+            None if attributes is None else rows(attributes, chosen),
         )
 
     @classmethod
@@ -58,6 +62,7 @@ class LidarBatch(Value):
             _joined_field([batch.intensity for batch in batches]),
             _joined_field([batch.ring for batch in batches]),
             _joined_field([batch.angles for batch in batches]),
+            _joined_field([batch.attributes for batch in batches]),
         )
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from bentwing.base.errors import RecordingError
 from bentwing.recording import problems
+from bentwing.recording.attributes import NO_ATTRIBUTES
 from bentwing.recording.messages import wire
 from bentwing.recording.messages.lidar_messages import LIDAR_MESSAGES
 from bentwing.recording.stamps import StampMonitor
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from bentwing.base.clock import Clock
+    from bentwing.recording.attributes import Attributes
     from bentwing.recording.batches import LidarBatch
     from bentwing.recording.point_times import Reading
     from bentwing.recording.readings import LidarReading
@@ -37,6 +39,7 @@ class LidarStream:
     reading : of the points
     times : how the time of each point is read, where the type needs it
     needs_beam_times : refuse scans that do not tell when each beam was measured
+    attributes : further fields that are wanted
     """
 
     def __init__(
@@ -50,6 +53,7 @@ class LidarStream:
         use_recorder_time: bool,
         times: Reading | None,
         needs_beam_times: bool,
+        attributes: Attributes = NO_ATTRIBUTES,
     ) -> None:
         self.counts: Counter[str] = Counter()
         self.monitor = StampMonitor(
@@ -63,7 +67,7 @@ class LidarStream:
         self._clock, self._needs_beam_times = clock, needs_beam_times
         self._reading = reading
         self._decoder = LIDAR_MESSAGES[kind](
-            cdr=cdr, reading=times, range_scale=reading.range_scale
+            cdr=cdr, reading=times, range_scale=reading.range_scale, attributes=attributes
         )
         self._merger = SweepMerger(self.counts)
 

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from bentwing.base.clock import Clock
+    from bentwing.recording.attributes import Attributes
     from bentwing.recording.peek import Peek
     from bentwing.recording.readings import Readings
     from bentwing.recording.streams import Stream
@@ -27,6 +28,7 @@ def open_streams(
     *,
     cdr: bool,
     needs_beam_times: bool,
+    attributes: Attributes,
 ) -> dict[str, Stream]:
     """Return the streams by role, in the order of `roles`.
 
@@ -37,6 +39,7 @@ def open_streams(
     readings : of the samples, by the payload
     cdr : ROS 2's encoding instead of ROS 1's
     needs_beam_times : refuse scans that do not tell when each beam was measured
+    attributes : further fields of the lidar's points that are wanted
     """
     # A lidar and the IMU in it share their clock.
     packet_clocks = {
@@ -51,7 +54,7 @@ def open_streams(
         if found.packet_clock is not None:
             packet_clock = packet_clocks[found.packet_clock]
             if found.lidar_packets is not None:
-                points = found.lidar_packets()
+                points = found.lidar_packets(attributes=attributes)
                 return PacketLidarStream(
                     found.topic, clock, points, packet_clock, readings.lidar, cdr=cdr
                 )
@@ -73,6 +76,7 @@ def open_streams(
             use_recorder_time=zero,
             times=found.reading,
             needs_beam_times=needs_beam_times,
+            attributes=attributes,
         )
 
     return {role: stream(role) for role in roles}

@@ -96,6 +96,20 @@ class Payload(Section):
             return
         write_text(file, self.to_yaml())
 
+    def carrying(self, attributes: tuple[str, ...]) -> Payload:
+        """Return the same head with these further fields of the lidar's points carried to the map.
+
+        Raises
+        ------
+        PayloadError
+            If a name is empty or there twice.
+        """
+        try:
+            lidar = Lidar.model_validate({**dict(self.lidar), "attributes": attributes})
+        except ValidationError as error:
+            raise PayloadError(describe(error, Lidar, "lidar")) from None
+        return self.model_copy(update={"lidar": lidar})
+
     @property
     def describes_imu(self) -> bool:
         """Whether the file says that the head carries an IMU."""

@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass, replace
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from bentwing.recording.point_times import NOTHING_GIVEN
 from bentwing.recording.sweep_stamps import SweepStamps
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     from bentwing.recording.containers.interface import Source
     from bentwing.recording.containers.scanned import TopicInfo
@@ -46,6 +47,7 @@ class Peek:
     lack : why points have no times and get none
     packet_clock : what the stamps of raw packets mean
     joints : names in the messages of an encoder
+    fields : of a lidar's points that a map can carry, with their types
     lidar_packets, imu_packets : makers of the decoder for raw packets, the one of the role
     """
 
@@ -59,7 +61,8 @@ class Peek:
     lack: str = ""
     packet_clock: ClockReading | None = None
     joints: tuple[str, ...] = ()
-    lidar_packets: Callable[[], LidarPackets] | None = None
+    fields: Mapping[str, np.dtype[Any]] = field(default_factory=dict)
+    lidar_packets: Callable[..., LidarPackets] | None = None
     imu_packets: Callable[[], ImuPackets] | None = None
 
     def shifted(self, offset_ns: int) -> Peek:
@@ -97,8 +100,10 @@ def peek(source: Source, topic: TopicInfo, given: GivenTimes = NOTHING_GIVEN) ->
     sentence: str | None = None
     reading: Reading | None = None
     made: Reading | str | None = None
+    fields: dict[str, np.dtype[Any]] = {}
     if topic.type in LIDAR_MESSAGES:
         decoder = LIDAR_MESSAGES[topic.type](cdr=source.cdr)
+        fields = _fields(decoder, messages)
         sentence, reading = decoder.point_times(messages, stamps_ns, given)
         if sentence is None:
             made = _made_times(source, topic, decoder, given)
@@ -114,7 +119,16 @@ def peek(source: Source, topic: TopicInfo, given: GivenTimes = NOTHING_GIVEN) ->
         reading=reading,
         are_times_made=made is not None and reading is not None,
         lack=made if isinstance(made, str) else "",
+        fields=fields,
     )
+
+
+def _fields(decoder: LidarDecoder[Any], messages: list[bytes]) -> dict[str, np.dtype[Any]]:
+    """Return the fields of the last readable message; the first ones of a driver are often incomplete."""
+    for raw in reversed(messages):
+        with suppress(wire.BrokenMessageError):
+            return decoder.fields(raw)
+    return {}
 
 
 def _made_times(

@@ -6,12 +6,13 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from bentwing.base.clock import NS_PER_S, Clock
 from bentwing.base.errors import PayloadError, RecordingError
 from bentwing.base.log import get_logger
 from bentwing.recording import imu_units, problems
+from bentwing.recording.attributes import Attributes
 from bentwing.recording.clocks.look_ahead import look_ahead
 from bentwing.recording.clocks.rates import rate_of, run_apart
 from bentwing.recording.containers.source import open_source
@@ -32,9 +33,10 @@ from bentwing.recording.tf_mount import TfMount, tf_mount
 from bentwing.recording.topics import NAV_SAT_FIX, PACKET_TYPES, resolve
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
     from types import TracebackType
 
+    import numpy as np
     from typing_extensions import Self
 
     from bentwing.recording.batches import Batch, ImuBatch
@@ -96,6 +98,9 @@ class Recording:
         for role, topic in found.items():
             offset_ns: int = getattr(self._readings, role).offset_ns
             self._peeks[role] = self._peek(role, topic, is_alone=is_alone).shifted(offset_ns)
+        self._attributes = Attributes.of(
+            self.payload.lidar.attributes, self.lidar_fields, self.lidar_topic
+        )
         self.clock = Clock(min(found.first_ns for found in self._peeks.values()))
         for role, peeked in self._peeks.items():
             _log.info("%s: %s (%s)", role, peeked.topic.name, peeked.topic.type)
@@ -260,6 +265,11 @@ class Recording:
     def has_fixes(self) -> bool:
         """Whether the recording has the topic of GNSS fixes that the payload names."""
         return self._gnss_topic() is not None
+
+    @property
+    def lidar_fields(self) -> Mapping[str, np.dtype[Any]]:
+        """Fields of the lidar's points that a map can carry as attributes, with their types."""
+        return self._peeks["lidar"].fields
 
     @property
     def point_times(self) -> str | None:
@@ -432,7 +442,13 @@ class Recording:
     def _open_streams(self, roles: Sequence[str]) -> dict[str, Stream]:
         cdr, strict = self._source.cdr, self.strict
         return open_streams(
-            self._peeks, roles, self.clock, self._readings, cdr=cdr, needs_beam_times=strict
+            self._peeks,
+            roles,
+            self.clock,
+            self._readings,
+            cdr=cdr,
+            needs_beam_times=strict,
+            attributes=self._attributes,
         )
 
     def _topic(self, role: str) -> str | None:

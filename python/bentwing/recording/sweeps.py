@@ -64,7 +64,7 @@ class SweepMerger:
 
 def _merged(batches: Sequence[LidarBatch]) -> LidarBatch:
     """Join sweeps in time order; of equal times the earlier sweep's come first."""
-    joined = _concatenated(batches)
+    joined = batches[0] if len(batches) == 1 else LidarBatch.joined(batches)
     drops = np.flatnonzero(joined.times[1:] < joined.times[:-1])
     if not len(drops):
         return joined
@@ -76,20 +76,8 @@ def _merged(batches: Sequence[LidarBatch]) -> LidarBatch:
     before, after = np.split(joined.times, [drops[-1] + 1])
     end = len(before) + int(np.searchsorted(after, before.max(), side="left"))
     order = begin + np.argsort(joined.times[begin:end], kind="stable")
-    for field in (joined.points, joined.times, joined.intensity, joined.ring):
+    fields = (joined.points, joined.times, joined.intensity, joined.ring, joined.attributes)
+    for field in fields:
         if field is not None:
             field[begin:end] = field[order]
     return joined
-
-
-def _concatenated(batches: Sequence[LidarBatch]) -> LidarBatch:
-    if len(batches) == 1:
-        return batches[0]
-    intensities = [batch.intensity for batch in batches if batch.intensity is not None]
-    rings = [batch.ring for batch in batches if batch.ring is not None]
-    return LidarBatch(
-        np.concatenate([batch.points for batch in batches]),
-        np.concatenate([batch.times for batch in batches]),
-        np.concatenate(intensities) if len(intensities) == len(batches) else None,
-        np.concatenate(rings) if len(rings) == len(batches) else None,
-    )

@@ -57,10 +57,11 @@ class Head:
         self.set_up: SetUp | None = None
         self._progress = progress
         self._kept: KeptBatches | None = None
-        if settings.payload == Payload.default():
+        carried = settings.payload.lidar.attributes
+        if settings.payload == Payload.default().carrying(carried):
             from bentwing.calibrate.draft import draft_payload
 
-            self._describe(draft_payload(self.paths).payload)
+            self._describe(draft_payload(self.paths).payload.carrying(carried))
         self.recording = Recording(self.paths, self.settings.payload, strict=False)
 
     def __enter__(self) -> Self:

@@ -174,6 +174,10 @@ class RunSettings(MapSettings):
         chosen: EstimatorSettings = getattr(self, self.estimator)
         return chosen
 
+    def carrying(self, attributes: tuple[str, ...]) -> Self:
+        """Return the same with these further fields of the lidar's points in the map."""
+        return self.model_copy(update={"payload": self.payload.carrying(attributes)})
+
     @property
     def closing(self) -> GlobalSettings:
         """Settings of the registration that corrects the trajectory."""
@@ -187,14 +191,14 @@ class RunSettings(MapSettings):
     def to_json(self) -> dict[str, Any]:
         """Return the settings in plain JSON types, without those of other estimators."""
         described = super().to_json()
+        if self.payload.imu is not None and not self.payload.describes_imu:
+            # Its mention would say that the head carries one.
+            del described["payload"]["imu"]
         return {k: v for k, v in described.items() if k == self.estimator or k not in ESTIMATORS}
 
     def to_yaml(self) -> str:
         """Return the settings as YAML that says the same when it is read again."""
         described = self.to_json()
-        if self.payload.imu is not None and not self.payload.describes_imu:
-            # Its mention would say that the head carries one.
-            del described["payload"]["imu"]
         return yaml.safe_dump(described, sort_keys=False, allow_unicode=True)
 
 

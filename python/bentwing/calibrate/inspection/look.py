@@ -67,6 +67,7 @@ class Inspection:
     warnings : what may make the map worse
     set_up : the sensor head as the motion shows it; None where there is no IMU and no encoder
     tf_mount : where the lidar is on the IMU by /tf_static; None without it
+    fields : by name the types of what else the lidar says of each point, for `--attributes`
     """
 
     paths: list[str]
@@ -84,6 +85,7 @@ class Inspection:
     set_up: SetUp | None = None
     clocks: dict[str, str] = field(default_factory=dict)
     tf_mount: TfMount | None = None
+    fields: dict[str, str] = field(default_factory=dict)
 
     @property
     def is_fit(self) -> bool:
@@ -194,6 +196,7 @@ def _inspect_recording(recording: Recording, *, has_payload: bool) -> Inspection
         recording.warnings + warnings,
         clocks={role: str(clock) for role, clock in recording.clocks.items()},
         tf_mount=recording.tf_mount(),
+        fields={name: kind.name for name, kind in recording.lidar_fields.items()},
     )
 
 

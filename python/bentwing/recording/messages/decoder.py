@@ -4,8 +4,9 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING, ClassVar, Generic, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Protocol, TypeVar
 
+from bentwing.recording.attributes import NO_ATTRIBUTES
 from bentwing.recording.messages import wire
 
 if TYPE_CHECKING:
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from bentwing.recording.attributes import Attributes
     from bentwing.recording.batches import LidarBatch
     from bentwing.recording.point_times import GivenTimes, Reading
     from bentwing.recording.sweep_stamps import SweepStamps
@@ -40,16 +42,33 @@ class LidarDecoder(ABC, Generic[Message]):
     reading : of the points' times, where `point_times` found that it needs one
     range_scale : m per unit of the ranges, where it takes limits of range from the messages; the points
         are handed out in the unit of the messages
+    attributes : further fields that are wanted, see `fields`
     """
 
     is_planar: ClassVar[bool] = False
 
     def __init__(
-        self, *, cdr: bool, reading: Reading | None = None, range_scale: float = 1.0
+        self,
+        *,
+        cdr: bool,
+        reading: Reading | None = None,
+        range_scale: float = 1.0,
+        attributes: Attributes = NO_ATTRIBUTES,
     ) -> None:
         self.cdr = cdr
         self.reading = reading
         self.range_scale = range_scale
+        self.attributes = attributes
+
+    def fields(self, raw: bytes) -> dict[str, np.dtype[Any]]:  # noqa: ARG002 - not every type has any
+        """Return the fields of a message's points that a map can carry, with their types.
+
+        Raises
+        ------
+        BrokenMessageError
+            It cannot be read.
+        """
+        return {}
 
     @abstractmethod
     def point_times(

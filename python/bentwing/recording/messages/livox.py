@@ -4,10 +4,11 @@
 from __future__ import annotations
 
 import struct
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from bentwing.recording.attributes import selectable
 from bentwing.recording.batches import LidarBatch
 from bentwing.recording.messages.decoder import LidarDecoder
 from bentwing.recording.messages.point_cloud2 import valid
@@ -19,13 +20,14 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from bentwing.recording.attributes import Attributes
     from bentwing.recording.point_times import GivenTimes
 
 MAX_OFFSET_NS = 1_000_000_000
 
 
 class RawLivox(NamedTuple):
-    """Livox CustomMsg; `points` is structured: offset_time (ns), x, y, z (m), reflectivity, line."""
+    """Livox CustomMsg; `points` is structured: offset_time (ns), x, y, z (m), reflectivity, tag, line."""
 
     stamp_ns: int
     points: NDArray[np.void]
@@ -50,6 +52,11 @@ class LivoxClouds(LidarDecoder[RawLivox]):
         offsets = message.points["offset_time"]
         return message.stamp_ns, float(np.ptp(offsets)) * 1e-9 if len(offsets) else None
 
+    def fields(self, raw: bytes) -> dict[str, np.dtype[Any]]:
+        """Return the fields beside the coordinates."""
+        dtype = livox_custom(raw, cdr=self.cdr).points.dtype
+        return selectable({n: dtype[n] for n in dtype.names or () if n not in {*"xyz"}})
+
     def parse(self, raw: bytes, counts: Counter[str]) -> RawLivox:  # noqa: ARG002 - nothing is left out yet
         """Read a message."""
         return livox_custom(raw, cdr=self.cdr)
@@ -59,10 +66,12 @@ class LivoxClouds(LidarDecoder[RawLivox]):
     ) -> list[LidarBatch]:
         """Return the points, sorted by time, one batch per message."""
         pairs = zip(messages, starts.tolist(), strict=True)
-        return [_sweep(message.points, start, counts) for message, start in pairs]
+        return [_sweep(message.points, start, counts, self.attributes) for message, start in pairs]
 
 
-def _sweep(table: NDArray[np.void], start: float, counts: Counter[str]) -> LidarBatch:
+def _sweep(
+    table: NDArray[np.void], start: float, counts: Counter[str], attributes: Attributes
+) -> LidarBatch:
     points = np.column_stack([table[axis] for axis in "xyz"]).astype(np.float64)
     keep = valid(points, counts)
     is_near = table["offset_time"] < MAX_OFFSET_NS
@@ -73,6 +82,7 @@ def _sweep(table: NDArray[np.void], start: float, counts: Counter[str]) -> Lidar
         start + offsets,
         table["reflectivity"].astype(np.float32),
         table["line"].astype(np.uint16),
+        attributes=attributes.gathered(len(table), table.__getitem__),
     ).where(keep & is_near)
     return batch.where(np.argsort(batch.times, kind="stable"))
 
@@ -100,9 +110,9 @@ def livox_custom(raw: bytes, *, cdr: bool) -> RawLivox:
 def _livox_dtype(order: str, step: int) -> np.dtype[np.void]:
     return np.dtype(
         {
-            "names": ["offset_time", "x", "y", "z", "reflectivity", "line"],
-            "formats": [f"{order}u4", f"{order}f4", f"{order}f4", f"{order}f4", "u1", "u1"],
-            "offsets": [0, 4, 8, 12, 16, 18],
+            "names": ["offset_time", "x", "y", "z", "reflectivity", "tag", "line"],
+            "formats": [f"{order}u4", f"{order}f4", f"{order}f4", f"{order}f4", "u1", "u1", "u1"],
+            "offsets": [0, 4, 8, 12, 16, 17, 18],
             "itemsize": step,
         }
     )

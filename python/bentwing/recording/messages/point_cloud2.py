@@ -4,11 +4,12 @@
 from __future__ import annotations
 
 from collections import Counter
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from bentwing.recording import point_times
+from bentwing.recording.attributes import NO_ATTRIBUTES, selectable
 from bentwing.recording.batches import LidarBatch, rows
 from bentwing.recording.messages import wire_clouds
 from bentwing.recording.messages.decoder import LidarDecoder
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from bentwing.recording.attributes import Attributes
     from bentwing.recording.messages.wire_clouds import RawCloud, RawField
     from bentwing.recording.point_times import GivenTimes, Reading
     from bentwing.recording.sweep_stamps import SweepStamps
@@ -42,6 +44,7 @@ class Columns(NamedTuple):
     intensity: NDArray[np.float32] | None
     ring: NDArray[np.uint16] | None
     line: NDArray[np.uint16] | None = None
+    attributes: NDArray[np.void] | None = None
 
 
 class Cloud(NamedTuple):
@@ -99,11 +102,16 @@ class PointClouds(LidarDecoder[Cloud]):
         known = offsets[np.isfinite(offsets)]
         return cloud.stamp_ns, float(np.ptp(known)) if len(known) else None
 
+    def fields(self, raw: bytes) -> dict[str, np.dtype[Any]]:
+        """Return the fields beside the coordinates."""
+        found = _usable_fields(wire_clouds.point_cloud(raw, cdr=self.cdr))
+        return selectable({n: DATATYPES[f.datatype] for n, f in found.items() if n not in {*"xyz"}})
+
     def parse(self, raw: bytes, counts: Counter[str]) -> Cloud:
         """Read a message."""
         cloud = wire_clouds.point_cloud(raw, cdr=self.cdr)
         name = self.reading.name if isinstance(self.reading, TimeReading) else None
-        return Cloud(cloud.stamp_ns, columns(cloud, counts, name))
+        return Cloud(cloud.stamp_ns, columns(cloud, counts, name, self.attributes))
 
     def batches(
         self, messages: Sequence[Cloud], starts: NDArray[np.float64], counts: Counter[str]
@@ -125,7 +133,12 @@ def _without(cloud: RawCloud) -> str:
     return f"have the fields {', '.join(_usable_fields(cloud)) or 'none'}"
 
 
-def columns(cloud: RawCloud, counts: Counter[str], times: str | None = None) -> Columns:
+def columns(
+    cloud: RawCloud,
+    counts: Counter[str],
+    times: str | None = None,
+    attributes: Attributes = NO_ATTRIBUTES,
+) -> Columns:
     """Return the valid points of a cloud.
 
     Parameters
@@ -133,17 +146,19 @@ def columns(cloud: RawCloud, counts: Counter[str], times: str | None = None) -> 
     cloud : the message
     counts : receives `returns` (all points), `nan`, `inf`, `zero`
     times : name of the time field; None: a usual one
+    attributes : further fields that are wanted
 
     Raises
     ------
     BrokenMessageError
-        The layout contradicts itself, or x, y, z are missing.
+        The layout contradicts itself, or x, y, z or an attribute are missing.
     """
     table = _table(cloud).reshape(-1)
     names = table.dtype.names or ()
-    if not {"x", "y", "z"} <= set(names):
+    needed = (*"xyz", *attributes.sources)
+    if not set(needed) <= set(names):
         found = ", ".join(field.name for field in cloud.fields) or "none"
-        msg = f"no fields x, y, z (found {found})"
+        msg = f"no fields {', '.join(needed)} (found {found})"
         raise BrokenMessageError(msg)
     points = np.empty((len(table), 3))
     for axis, name in enumerate("xyz"):
@@ -160,6 +175,7 @@ def columns(cloud: RawCloud, counts: Counter[str], times: str | None = None) -> 
         None if intensity is None else table[intensity].astype(np.float32),
         None if ring is None else _rings(table[ring]),
         _lines(cloud)[keep] if ring is None and cloud.height > 1 else None,
+        attributes.gathered(len(table), table.__getitem__),
     )
 
 
@@ -188,23 +204,27 @@ def sweep(
     if isinstance(reading, TurnReading):
         groups = cols.line if cols.ring is None else cols.ring
         offsets = reading.offsets(cols.points, groups)
-        batch = LidarBatch(cols.points, start + offsets, cols.intensity, cols.ring)
+        batch = _batch(cols, start + offsets)
         return batch.where(np.argsort(offsets, kind="stable"))
     if not isinstance(reading, TimeReading) or cols.raw_times is None:
         times = np.full(len(cols.points), start)
-        return LidarBatch(cols.points, times, cols.intensity, cols.ring)
+        return _batch(cols, times)
     offsets = reading.offsets(cols.raw_times, stamp_ns)
     limit = (
         point_times.MAX_CLOCK_DIFFERENCE if reading.origin == "epoch" else point_times.MAX_OFFSET
     )
     keep = np.abs(offsets) <= limit
-    batch = LidarBatch(cols.points, start + offsets, cols.intensity, cols.ring)
+    batch = _batch(cols, start + offsets)
     if not keep.all():
         counts["bad_point_time"] += int((~keep).sum())
         batch = batch.where(keep)
     if (batch.times[1:] < batch.times[:-1]).any():
         batch = batch.where(np.argsort(batch.times, kind="stable"))
     return batch
+
+
+def _batch(cols: Columns, times: NDArray[np.float64]) -> LidarBatch:
+    return LidarBatch(cols.points, times, cols.intensity, cols.ring, attributes=cols.attributes)
 
 
 def _table(cloud: RawCloud) -> NDArray[np.void]:

@@ -16,6 +16,7 @@ import numpy as np
 
 from bentwing.base.errors import PayloadError, RecordingError
 from bentwing.base.regular_file import require_regular
+from bentwing.recording.attributes import NO_ATTRIBUTES, selectable
 from bentwing.recording.batches import LidarBatch
 
 if TYPE_CHECKING:
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
     from types import ModuleType
 
     from numpy.typing import NDArray
+
+    from bentwing.recording.attributes import Attributes
 
 _MOST_OF_METADATA = 2**24  # bytes
 IS_VALID = 1  # bit of a column's status
@@ -126,19 +129,38 @@ class _Columns(NamedTuple):
 
 
 class OusterPackets:
-    """The lidar packets of one Ouster in their order."""
+    """The lidar packets of one Ouster in their order.
+
+    Parameters
+    ----------
+    core, info : the library, and the sensor's description
+    attributes : further fields that are wanted, see `fields`
+    """
 
     period_ns: int | None = None
 
-    def __init__(self, core: ModuleType, info: Any) -> None:  # noqa: ANN401 - not our type
+    def __init__(
+        self,
+        core: ModuleType,
+        info: Any,  # noqa: ANN401 - not our type
+        *,
+        attributes: Attributes = NO_ATTRIBUTES,
+    ) -> None:
         self._core = core
         self._format = core.PacketFormat(info)
+        self._attributes = attributes
         self._shape = (info.format.pixels_per_column, info.format.columns_per_frame)
         # The identity leaves the points in the lidar's own frame.
         info.lidar_to_sensor_transform = np.eye(4)
         self._project = core.XYZLut(info, use_extrinsics=False)
         names = set(self._format.fields)
         self._intensity = next(name for name in INTENSITIES if name in names)
+
+    def fields(self, packet: bytes) -> dict[str, np.dtype[Any]]:
+        """Return the fields of the sensor's profile."""
+        packet = _trimmed(packet, self._format)
+        found = self._format.packet_field
+        return selectable({name: found(name, packet).dtype for name in self._format.fields})
 
     def stamp_ns(self, packet: bytes) -> int | None:
         """Return the sensor's time of the first column in ns; None for no such packet."""
@@ -168,12 +190,7 @@ class OusterPackets:
         ]
         turns = itertools.groupby(columns, key=lambda part: part.turn)
         batches = [self._turn(list(parts), counts) for _, parts in turns]
-        return LidarBatch(
-            np.concatenate([batch.points for batch in batches]),
-            np.concatenate([batch.times for batch in batches]),
-            np.concatenate([batch.intensity for batch in batches if batch.intensity is not None]),
-            np.concatenate([batch.ring for batch in batches if batch.ring is not None]),
-        )
+        return LidarBatch.joined(batches)
 
     def _columns(self, packet: bytes, start: float, counts: Counter[str]) -> _Columns:
         packet = _trimmed(packet, self._format)
@@ -190,7 +207,7 @@ class OusterPackets:
             start + offsets_ns[keep] * 1e-9,
             {
                 name: self._format.packet_field(name, packet)[:, keep]
-                for name in ("RANGE", self._intensity)
+                for name in {"RANGE", self._intensity, *self._attributes.sources}
             },
         )
 
@@ -198,10 +215,11 @@ class OusterPackets:
         """Project the columns of one turn, of which the SDK wants a whole image."""
         places = np.concatenate([part.places for part in parts])
         times = np.concatenate([part.times for part in parts])
-        ranges, intensities = (
-            np.concatenate([part.fields[name] for part in parts], axis=1)
-            for name in ("RANGE", self._intensity)
-        )
+
+        def field(name: str) -> NDArray[Any]:
+            return np.concatenate([part.fields[name] for part in parts], axis=1)
+
+        ranges = field("RANGE")
         image = np.zeros(self._shape, np.uint32)
         image[:, places] = ranges
         # Column by column, as they were measured.
@@ -213,8 +231,9 @@ class OusterPackets:
         return LidarBatch(
             np.ascontiguousarray(points, dtype=np.float64),
             np.repeat(times, n_beams),
-            intensities.T.ravel().astype(np.float32),
+            field(self._intensity).T.ravel().astype(np.float32),
             np.tile(np.arange(n_beams, dtype=np.uint16), len(places)),
+            attributes=self._attributes.gathered(len(keep), lambda name: field(name).T.ravel()),
         ).where(keep)
 
 

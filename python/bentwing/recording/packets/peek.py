@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from bentwing.recording.messages import wire, wire_packets
 from bentwing.recording.packets import clock as packet_clock
@@ -12,11 +12,13 @@ from bentwing.recording.packets.clock import PacketClock
 from bentwing.recording.peek import Peek, unreadable
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from bentwing.recording.containers.interface import Source
     from bentwing.recording.containers.scanned import TopicInfo
     from bentwing.recording.messages.wire_packets import Packet
     from bentwing.recording.packets.clock import ClockReading
-    from bentwing.recording.packets.sensors import StampedPackets
+    from bentwing.recording.packets.sensors import LidarPackets, StampedPackets
     from bentwing.recording.sections.lidar import Lidar
 
 N_PEEKED = 200  # packets, a tenth to a third of a second of most lidars
@@ -48,6 +50,7 @@ def peek_lidar(source: Source, topic: TopicInfo, lidar: Lidar, *, is_alone: bool
         point_times=str(clock),
         packet_clock=clock,
         lidar_packets=make,
+        fields=_fields(make(), packets),
     )
 
 
@@ -85,6 +88,12 @@ def _first_packets(source: Source, topic: TopicInfo) -> list[Packet]:
     if not found:
         raise unreadable(topic)
     return found
+
+
+def _fields(decoder: LidarPackets, packets: list[Packet]) -> dict[str, np.dtype[Any]]:
+    """Return the fields of the first packet that can be read."""
+    readable = (one.data for one in packets if decoder.stamp_ns(one.data) is not None)
+    return decoder.fields(next(readable))
 
 
 def _stamps(

@@ -40,6 +40,9 @@ class StampedPackets(Protocol):
 class LidarPackets(StampedPackets, Protocol):
     """Decoder of one lidar's packets; made anew for every pass over the recording."""
 
+    def fields(self, packet: bytes) -> dict[str, np.dtype[Any]]:
+        """Return the fields of its points that a map can carry, with their types."""
+
     def points(
         self, packets: Sequence[bytes], times: NDArray[np.float64], counts: Counter[str]
     ) -> LidarBatch:
@@ -57,8 +60,8 @@ class ImuPackets(StampedPackets, Protocol):
 
 def lidar_packets(
     source: Source, topic: TopicInfo, lidar: Lidar, first: bytes
-) -> Callable[[], LidarPackets]:
-    """Return a maker of decoders for a lidar's packets.
+) -> Callable[..., LidarPackets]:
+    """Return a maker of decoders for a lidar's packets, which takes the `attributes` that are wanted.
 
     Parameters
     ----------

@@ -8,11 +8,12 @@ is kept.
 from __future__ import annotations
 
 import struct
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from bentwing.base.errors import RecordingError
+from bentwing.recording.attributes import NO_ATTRIBUTES, selectable
 from bentwing.recording.batches import LidarBatch
 from bentwing.recording.messages.wire_packets import VELODYNE_SIZE
 
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from bentwing.recording.attributes import Attributes
     from bentwing.recording.lidar_kinds import VelodyneModel
 
 HOUR_NS = 3_600_000_000_000
@@ -93,11 +95,19 @@ class VelodynePackets:
     decoder : the library
     model : the sensor's
     sent : number of the model in the packets, which the HDL-32E gives since 2016 only
+    attributes : further fields that are wanted, see `fields`
     """
 
     period_ns: int | None = HOUR_NS
 
-    def __init__(self, decoder: ModuleType, model: VelodyneModel, sent: int) -> None:
+    def __init__(
+        self,
+        decoder: ModuleType,
+        model: VelodyneModel,
+        sent: int,
+        *,
+        attributes: Attributes = NO_ATTRIBUTES,
+    ) -> None:
         self._library = decoder
         self._number, self._sent = MODELS[model].number, sent
         self._is_alpha = model == "vls128"
@@ -108,6 +118,12 @@ class VelodynePackets:
             timestamp_first_packet=True,
         )
         self._decoder = decoder.ScanDecoder(config)
+        self._attributes = attributes
+
+    def fields(self, packet: bytes) -> dict[str, np.dtype[Any]]:
+        """Return the fields beside the coordinates."""
+        dtype = self._table([packet], np.zeros(1)).dtype
+        return selectable({n: dtype[n] for n in dtype.names or () if n not in {*"xyz"}})
 
     def stamp_ns(self, packet: bytes) -> int | None:
         """Return ns since the top of the hour of the first firing; None for no such packet."""
@@ -129,12 +145,7 @@ class VelodynePackets:
         times : (N,) s, of each packet's first firing
         counts : receives `returns` (all firings of a laser) and `zero` (those without a return)
         """
-        library = self._library
-        pair = library.velodyne_decoder_pylib.TimePair
-        vector = library.PacketVector()
-        for packet, t in zip(packets, (times - times[0]).tolist(), strict=True):
-            vector.append(library.VelodynePacket(pair(t, t), self._normal(packet)))
-        _, table = self._decoder.decode(vector, as_pcl_structs=True)
+        table = self._table(packets, times)
         table = table[(table["return_type"] & STRONGEST) != 0]
         n_fired = sum(map(self._n_fired, packets))
         counts["returns"] += n_fired
@@ -145,8 +156,19 @@ class VelodynePackets:
             times[0] + table["time"].astype(np.float64),
             table["intensity"].astype(np.float32),
             table["ring"].astype(np.uint16),
+            attributes=self._attributes.gathered(len(table), table.__getitem__),
         )
         return batch.where(np.argsort(batch.times, kind="stable"))
+
+    def _table(self, packets: Sequence[bytes], times: NDArray[np.float64]) -> NDArray[np.void]:
+        """Decode consecutive packets."""
+        library = self._library
+        pair = library.velodyne_decoder_pylib.TimePair
+        vector = library.PacketVector()
+        for packet, t in zip(packets, (times - times[0]).tolist(), strict=True):
+            vector.append(library.VelodynePacket(pair(t, t), self._normal(packet)))
+        table: NDArray[np.void] = self._decoder.decode(vector, as_pcl_structs=True)[1]
+        return table
 
     def _normal(self, packet: bytes) -> bytes:
         """Return the packet with the model's number, and its one return called the strongest.

@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal, get_args
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from bentwing.base.units import Unit
+from bentwing.recording.attributes import stored_name
 from bentwing.recording.lidar_kinds import KIND_DEFAULTS, LidarKind, VelodyneModel
 from bentwing.recording.sections.beams import Beams
 from bentwing.recording.sections.ranges import Ranges
@@ -43,6 +44,7 @@ class Lidar(Section):
     mirrored : its scans run the other way: y of every point is negated
     range_scale : m per unit of the ranges in the recording; 0.001 for millimetres
     beams : by how much each beam of a multi-beam lidar is off; None for not at all
+    attributes : further fields of its points that the map carries, by their names in the messages
     ranges : by how much all ranges are too long; estimators start from it
     """
 
@@ -60,6 +62,7 @@ class Lidar(Section):
     mirrored: bool = False
     range_scale: Annotated[Positive, Unit("m per unit of the recording")] = 1.0
     beams: Beams | None = None
+    attributes: tuple[Annotated[str, Field(min_length=1)], ...] = ()
     ranges: Ranges | None = None
 
     @model_validator(mode="before")
@@ -85,6 +88,15 @@ class Lidar(Section):
             msg = f"min_range {self.min_range:g} m must be below max_range {self.max_range:g} m"
             raise ValueError(msg)
         return self
+
+    @field_validator("attributes")
+    @classmethod
+    def _each_once(cls, value: tuple[str, ...]) -> tuple[str, ...]:
+        names = [stored_name(name).lower() for name in value]
+        if twice := [v for v, name in zip(value, names, strict=True) if names.count(name) > 1]:
+            msg = f"{twice[-1]} is named twice"
+            raise ValueError(msg)
+        return value
 
     def differing(self) -> dict[str, Any]:
         """Return the fields that differ from the defaults of this kind."""

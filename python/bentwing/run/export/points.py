@@ -19,6 +19,7 @@ from bentwing.map.normals import moved, with_normals
 from bentwing.map.refine import refine
 from bentwing.map.thin import thin
 from bentwing.products.finished_map import open_map_of
+from bentwing.recording.attributes import stored_name
 from bentwing.run.export.area import area_in
 from bentwing.run.export.coordinates import same
 from bentwing.run.mapping import clock_of, in_turn, joined_trajectory, with_own_times
@@ -51,6 +52,7 @@ class ExportOptions:
     refine : whether points are moved along their beams to the surface that they measured together; None for
         what the map does
     normals : whether points have the normal of their surface, towards the lidar; None for what the map does
+    attributes : names of further fields of the lidar's points; None for those of the map
     epsg : projected system; None for that of the map
     local : whether coordinates are in the frame of the trajectory
     """
@@ -62,6 +64,7 @@ class ExportOptions:
     keep_mixed: bool | None = None
     refine: bool | None = None
     normals: bool | None = None
+    attributes: tuple[str, ...] | None = None
     epsg: int | None = None
     local: bool = False
 
@@ -132,7 +135,7 @@ class Points:
             return cls(origin, target, options, run, stored)
         _require_some(run, options, target, None)
         try:
-            sources = run.sources()
+            sources = [source.carrying(options.attributes) for source in run.sources()]
         except BentwingError as error:
             msg = f"{run.run.folder}: {reason}, so the recording has to be read again: {error}"
             raise type(error)(msg) from error
@@ -189,9 +192,13 @@ class Points:
         with progress.stage("export", stored.n_points, "points") as shown:
             read = _shown(stored.chunks(self._run.run.start_ns), shown.advance)
             if self._options.has_normals(self._run) and not self._run.has_normals:
-                read = with_normals(_seen(read, open_map_of(self._run.run.folder)), folder, threads=threads)
+                read = with_normals(
+                    _seen(read, open_map_of(self._run.run.folder)), folder, threads=threads
+                )
             elif not self._options.has_normals(self._run):
                 read = (replace(chunk, normals=None) for chunk in read)
+            if self._options.attributes is not None:
+                read = _carrying(read, [*map(stored_name, self._options.attributes)])
             yield read, self.target.from_map, self._run.coordinates.nearly_local
 
 
@@ -205,6 +212,9 @@ def _why_again(run: Finished, options: ExportOptions, stored: MapFile | None) ->
         return f"its map has one point in {run.spacing:g} m only"
     if options.cleaning(run.cleaning) != run.cleaning:
         return "its map was cleaned otherwise"
+    lacking = {*map(stored_name, options.attributes or ())} - {*stored.attributes}
+    if lacking:
+        return f"its map does not have {', '.join(sorted(lacking))}"
     if options.refines(run) != run.refines:
         return f"its map is {'' if run.refines else 'not '}refined"
     return None
@@ -279,9 +289,14 @@ def _duration(sources: list[Source]) -> float:
         return part.length
 
 
-def _seen(
-    chunks: Iterator[MapChunk], source: FinishedMap
-) -> Iterator[MapChunk]:
+def _carrying(chunks: Iterator[MapChunk], names: list[str]) -> Generator[MapChunk, None, None]:
+    """Leave out further fields of the points that are not asked for."""
+    for chunk in chunks:
+        kept = None if chunk.attributes is None or not names else chunk.attributes[names]
+        yield replace(chunk, attributes=kept)
+
+
+def _seen(chunks: Iterator[MapChunk], source: FinishedMap) -> Generator[MapChunk, None, None]:
     """Give the points of a map the directions in which the sensor saw them; NaN where unknown."""
     for chunk in chunks:
         near = replace(chunk, points=chunk.points - source.origin)

@@ -103,6 +103,12 @@ class Source:
 
         return MapSource(estimate, self.start_ns, chunks)
 
+    def carrying(self, attributes: tuple[str, ...] | None) -> Source:
+        """Return the run with these further fields of the lidar's points; None for its own."""
+        if attributes is None:
+            return self
+        return replace(self, payload=self.payload.carrying(attributes))
+
     @contextmanager
     def part(self) -> Iterator[RecordingPart]:
         """Open the part of the recording that the run used."""

@@ -21,6 +21,7 @@ ALLOWED = {
     r"public pose graphs are not at": "likewise",
     r"PDAL is not installed": "large; the weekly workflow has it",
     r"Open3D is not installed": "a gigabyte; the weekly workflow has it",
+    r"Open3D finds no driver": "likewise, with the package",
 }
 """Patterns of reasons that may skip a test in the continuous integration, and why each may."""
 

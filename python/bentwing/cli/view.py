@@ -8,10 +8,12 @@ import typer
 
 from bentwing.cli import options
 from bentwing.cli.options import RESULT, option
+from bentwing.products.names import Viewer
 
 EXAMPLES = (
     "bentwing view run",
     "bentwing view run --save run.rrd",
+    "bentwing view run --with open3d",
     "bentwing view run --pictures pictures",
     "bentwing view run --video frames --frames 500",
 )
@@ -20,8 +22,16 @@ EXAMPLES = (
 def command(
     run: options.Run,
     *,
+    viewer: Annotated[
+        Viewer, option(RESULT, "--with", help="Program that shows it; each is an extra package.")
+    ] = "rerun",
     save: Annotated[
-        Path | None, option(RESULT, metavar="FILE", help="Write a .rrd file instead.")
+        Path | None,
+        option(
+            RESULT,
+            metavar="FILE",
+            help="Write a file instead: .rrd for rerun, or .png as Open3D draws it, without a screen.",
+        ),
     ] = None,
     max_points: Annotated[
         int,
@@ -48,7 +58,7 @@ def command(
     ] = 300,
     quiet: options.Quiet = False,
 ) -> None:
-    """Show a run in rerun: the map as it grows on three levels of detail, path, surfels, windows."""
+    """Show a run: the map as it grows on three levels of detail, path, surfels, windows; in Open3D map and path."""
     from bentwing.base.progress import create_progress
     from bentwing.report.view import view_run, write_frames, write_pictures
 
@@ -62,6 +72,13 @@ def command(
             f"{video}: {len(written)} frames; `ffmpeg -r 25 -i {video}/frame_%04d.png flight.mp4`"
         )
     if pictures is not None or video is not None:
+        return
+    if viewer == "open3d":
+        from bentwing.products.open3d_view import view_in_open3d
+
+        view_in_open3d(run, save=save, max_points=max_points, progress=progress)
+        if save is not None:
+            typer.echo(save)
         return
     view_run(run, save=save, max_points=max_points, progress=progress)
     if save is not None:

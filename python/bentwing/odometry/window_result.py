@@ -6,11 +6,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from bentwing import _core
 from bentwing.base.value import Value
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
     from bentwing.base.calibration import Calibration
@@ -30,6 +31,24 @@ class FixedView:
     def in_core(self) -> _core.FixedView:
         """Return the view as the core takes it, with its search grids: milliseconds of work."""
         return _core.FixedView([self._surfels], self.start, self.stop, self._samples, self._globals)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WindowSurfels(Value):
+    """Pieces of surface that a window has seen.
+
+    Attributes
+    ----------
+    points : (S, 3) float64, m, their middles in the map
+    normals : (S, 3) float64, unit, towards the lidar
+    times : (S,) float64, s, non-decreasing, mean of their points', lidar clock
+    edges : (S,) float64, m, of the voxels that their points were in
+    """
+
+    points: NDArray[np.float64]
+    normals: NDArray[np.float64]
+    times: NDArray[np.float64]
+    edges: NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,6 +87,18 @@ class WindowResult(Value):
     _surfels: _core.Surfels = field(repr=False, compare=False)
     _samples: _core.Samples = field(repr=False, compare=False)
     _globals: _core.Globals = field(repr=False, compare=False)
+
+    @property
+    def surfels(self) -> WindowSurfels:
+        """The pieces of surface in the points, where the corrected trajectory puts them."""
+        own = self._surfels
+        order = np.argsort(own.stamps, kind="stable")
+        means, stamps, angles = own.means[order], own.stamps[order], own.angles[order]
+        ends = [
+            self._samples.place_shots(places, stamps, angles, self._globals)[0]
+            for places in (means, means + own.normals[order])
+        ]
+        return WindowSurfels(ends[0], ends[1] - ends[0], stamps, own.voxel_sizes[order])
 
     def fixed_view(self, start: float | None = None, stop: float | None = None) -> FixedView:
         """Freeze the surfels of `[start, stop)`, s, in the map, for later windows to match with.

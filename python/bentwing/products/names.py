@@ -5,4 +5,5 @@ from __future__ import annotations
 
 from typing import Literal, TypeAlias
 
+Viewer: TypeAlias = Literal["rerun", "open3d"]
 MeshColour: TypeAlias = Literal["height", "intensity"]

@@ -3,21 +3,24 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bentwing.base.array_spool import columns_of
 from bentwing.base.errors import UsageError
 from bentwing.base.trajectory import Trajectory
-from bentwing.map.chunk import MapChunk
+from bentwing.map.chunk import MapChunk, untimed
+from bentwing.odometry.window_result import WindowResult
 from bentwing.products.finished_map import open_map_of
 from bentwing.products.map_chunks import chunks_of
 from bentwing.products.open3d_package import require_open3d
 from bentwing.products.oriented import OrientedPoints
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from pathlib import Path
+    from collections.abc import Iterable, Mapping
 
     from numpy.typing import NDArray
 
@@ -32,21 +35,26 @@ _COLUMNS = {
     "shift": "shift",
     "ring": "ring",
     "run_id": "run_id",
+    "normals": "normals",
 }
 
 
-def to_open3d(given: Path | str | MapChunk | OrientedPoints | Trajectory) -> Any:  # noqa: ANN401
-    """Return a map, points or a trajectory as a tensor geometry of Open3D.
+def to_open3d(
+    given: Path | str | MapChunk | Iterable[MapChunk] | OrientedPoints | WindowResult | Trajectory,
+) -> Any:  # noqa: ANN401
+    """Return a map, points, the surfaces of a window or a trajectory as a tensor geometry of Open3D.
 
     Parameters
     ----------
-    given : folder of a finished run, whose whole map has to fit into memory, or a value
+    given : folder of a finished run, whose whole map has to fit into memory; points or several chunks of
+        them, as `export_points` yields them; what `register_window` returns; or a trajectory
 
     Returns
     -------
     Of points an `open3d.t.geometry.PointCloud` with float64 `positions` in the coordinates given, of a run
     those of its map's file, and where they are known `time` (s), `intensity`, `sigma` (m), `range` (m) and the
-    other columns of `MapChunk`, each (N, 1); of `OrientedPoints` also `normals`. Of a trajectory an
+    other columns of `MapChunk`, attributes of the recording included, each (N, 1), and `normals` (N, 3).
+    Of a window its surfels, with `normals`, `time` and `edge` (m). Of a trajectory an
     `open3d.t.geometry.LineSet` through its poses, whose points have `time` and `quaternion` (x, y, z, w).
 
     Raises
@@ -62,7 +70,15 @@ def to_open3d(given: Path | str | MapChunk | OrientedPoints | Trajectory) -> Any
     if isinstance(given, OrientedPoints):
         columns = {"normals": given.normals.astype(np.float32), "intensity": given.intensity}
         return _cloud(o3d, given.points, columns)
-    chunk = given if isinstance(given, MapChunk) else _whole(given)
+    if isinstance(given, WindowResult):
+        seen = given.surfels
+        return _cloud(
+            o3d, seen.points, {"normals": seen.normals, "time": seen.times, "edge": seen.edges}
+        )
+    if isinstance(given, (str, Path)):
+        chunk = _whole(given)
+    else:
+        chunk = given if isinstance(given, MapChunk) else _joined(given)
     columns = {n: getattr(chunk, field) for n, field in _COLUMNS.items()}
     attributes = chunk.attributes
     if attributes is not None:
@@ -105,12 +121,17 @@ def from_open3d(geometry: Any) -> MapChunk | Trajectory:  # noqa: ANN401 - Open3
 def _whole(run: Path | str) -> MapChunk:
     """Read the whole map of a run."""
     source = open_map_of(run)
-    chunks = list(chunks_of(source))
-    fields = ("points", *_COLUMNS.values())
-    columns = {name: [getattr(chunk, name) for chunk in chunks] for name in fields}
-    joined = {n: np.concatenate(c) for n, c in columns.items() if all(v is not None for v in c)}
-    joined["points"] += source.origin
-    return MapChunk(**joined)
+    whole = _joined(chunks_of(source))
+    return replace(whole, points=whole.points + source.origin)
+
+
+def _joined(chunks: Iterable[MapChunk]) -> MapChunk:
+    """Join chunks; a column has to be in all of them."""
+    tables = [columns_of(chunk) for chunk in chunks]
+    if not tables:
+        return untimed(np.empty((0, 3)))
+    common = set.intersection(*map(set, tables))
+    return MapChunk(**{name: np.concatenate([t[name] for t in tables]) for name in common})
 
 
 def _cloud(
@@ -147,6 +168,21 @@ def _chunk(cloud: Any) -> MapChunk:  # noqa: ANN401
     }
     for name, field in _COLUMNS.items():
         if name in cloud.point:
-            columns[field] = cloud.point[name].numpy().ravel()
+            values = cloud.point[name].numpy()
+            columns[field] = values.astype(np.float32) if name == "normals" else values.ravel()
     columns["times"] = columns["times"].astype(np.float64)
+    columns["attributes"] = _further(cloud)
     return MapChunk(points, **columns)
+
+
+def _further(cloud: Any) -> NDArray[np.void] | None:  # noqa: ANN401
+    """Return the columns of one number for each point that a chunk does not have by name."""
+    others = set(cloud.point) - {"positions", *_COLUMNS}
+    values = {name: cloud.point[name].numpy() for name in sorted(others)}
+    single = {name: v.ravel() for name, v in values.items() if v.ndim == 2 and v.shape[1] == 1}
+    if not single:
+        return None
+    table = np.empty(len(cloud.point["positions"]), [(name, v.dtype) for name, v in single.items()])
+    for name, v in single.items():
+        table[name] = v
+    return table

@@ -7,12 +7,10 @@ import numpy as np
 import pytest
 
 from bentwing.base.errors import InputError, UsageError
-from bentwing.base.trajectory import Trajectory
 from bentwing.base.voxels import voxel_keys
-from bentwing.map.chunk import MapChunk
-from bentwing.products import from_open3d, mesh_of, oriented_points, to_open3d, write_mesh
+from bentwing.products import mesh_of, oriented_points, write_mesh
 from bentwing.products.mesh_files import write_triangles
-from support.known_points import START_NS, write_run
+from support.known_points import write_run
 
 THERE = np.array([640_500.0, 5_333_200.0, 200.0])
 RADIUS = 2.0
@@ -181,64 +179,3 @@ def test_open3d_reads_what_is_written(o3d, tmp_path, kind):
     if kind != "glb":  # its reader takes shares of light for colours of screens
         colours = np.asarray(mesh.vertex_colors)[np.asarray(mesh.triangles)]
         assert np.abs(colours - COLOURS[TRIANGLES] / 255).max() < 1e-3
-
-
-def test_a_map_becomes_a_cloud_with_all_it_has_and_comes_back(o3d, inside):
-    cloud = to_open3d(inside)
-    assert isinstance(cloud, o3d.t.geometry.PointCloud)
-    assert np.abs(cloud.point.positions.numpy() - (ball() + THERE)).max() < 1e-4
-    assert np.allclose(cloud.point["time"].numpy().ravel(), np.linspace(0, 10, 40_000), atol=1e-6)
-    assert "sigma" not in cloud.point
-    chunk = from_open3d(cloud)
-    assert np.array_equal(chunk.points, cloud.point.positions.numpy())
-    assert (chunk.ranges == 1.0).all()
-    assert chunk.sigma is None
-
-
-def test_columns_and_normals_are_attributes(o3d, inside):  # noqa: ARG001
-    rng = np.random.default_rng(142)
-    chunk = MapChunk(
-        rng.normal(size=(9, 3)) + THERE,
-        rng.uniform(size=9),
-        rng.uniform(size=9).astype(np.float32),
-        intensity=rng.uniform(size=9).astype(np.float32),
-        sigma=rng.uniform(size=9).astype(np.float32),
-        ring=np.arange(9, dtype=np.uint16),
-    )
-    back = from_open3d(to_open3d(chunk))
-    for name in ("points", "times", "ranges", "intensity", "sigma", "ring"):
-        assert np.array_equal(getattr(back, name), getattr(chunk, name)), name
-        assert getattr(back, name).dtype == getattr(chunk, name).dtype
-    points = oriented_points(inside, spacing=0.2)
-    normals = to_open3d(points).point["normals"].numpy()
-    assert np.abs(normals - points.normals).max() < 1e-6
-
-
-def test_a_trajectory_becomes_lines_and_comes_back(o3d):
-    rng = np.random.default_rng(143)
-    quats = rng.normal(size=(6, 4))
-    quats /= np.linalg.norm(quats, axis=1, keepdims=True)
-    way = Trajectory(np.arange(6.0), rng.normal(size=(6, 3)) + THERE, quats)
-    lines = to_open3d(way)
-    assert lines.line.indices.numpy().tolist() == [[i, i + 1] for i in range(5)]
-    back = from_open3d(lines)
-    assert np.array_equal(back.positions, way.positions)
-    assert np.array_equal(back.times, way.times)
-    assert np.allclose(back.quats_xyzw, way.quats_xyzw, atol=1e-15)
-    bare = o3d.t.geometry.LineSet(lines.point.positions, lines.line.indices)
-    with pytest.raises(UsageError, match="is no trajectory"):
-        from_open3d(bare)
-
-
-def test_a_legacy_cloud_is_points_and_a_box_is_refused(o3d):
-    legacy = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(ball(10) + THERE))
-    assert np.array_equal(from_open3d(legacy).points, ball(10) + THERE)
-    with pytest.raises(UsageError, match="AxisAlignedBoundingBox is neither"):
-        from_open3d(o3d.geometry.AxisAlignedBoundingBox())
-
-
-def test_times_of_a_run_begin_at_its_start(o3d, tmp_path):  # noqa: ARG001
-    run = write_run(tmp_path / "run", ball(100), map_format="ply")
-    times = to_open3d(run).point["time"].numpy().ravel()
-    assert START_NS > 10**18
-    assert times[[0, -1]] == pytest.approx([0.0, 10.0])

@@ -26,7 +26,11 @@ def table(number):
     order = np.arange(N)[::-1] if number % 2 else np.arange(N)
     points["x"] = 1 + order
     points["y"], points["time"] = 2.0, 0.002 * order
-    points["reflectivity"], points["near_ir"], points["return_number"] = order, 100 * number + order, 2
+    points["reflectivity"], points["near_ir"], points["return_number"] = (
+        order,
+        100 * number + order,
+        2,
+    )
     points["x"][3] = np.nan
     return points
 
@@ -38,7 +42,9 @@ def recording(ros, tmp_path):
 
 
 def head(*attributes):
-    return Payload.model_validate({"imu": None, "lidar": {"attributes": attributes, "max_range": 100}})
+    return Payload.model_validate(
+        {"imu": None, "lidar": {"attributes": attributes, "max_range": 100}}
+    )
 
 
 def read(recording, *attributes):
@@ -62,7 +68,9 @@ def test_without_a_wish_there_are_none(recording):
 
 
 def test_a_field_that_does_not_exist_is_refused_with_those_that_do(recording):
-    with pytest.raises(PayloadError, match=r"no field ambient; attributes can be time, ring, reflectivity, near_ir"):
+    with pytest.raises(
+        PayloadError, match=r"no field ambient; attributes can be time, ring, reflectivity, near_ir"
+    ):
         Recording(recording, head("near_ir", "ambient"))
 
 

@@ -45,14 +45,25 @@ def yard(*, with_pile: bool):
         floor = _ground(pile_on if with_pile else lambda places: np.zeros(len(places)))
         things = [
             box((0, 0, -0.1), rng.uniform(0.5, 1.6, 3)).moved((*at, 0.0), rng.uniform(0, np.pi))
-            for at in ((2.0, 4.0), (22.0, 3.5), (23.5, 12.0), (1.5, 17.0), (12.0, 1.5), (16.0, 20.5))
+            for at in (
+                (2.0, 4.0),
+                (22.0, 3.5),
+                (23.5, 12.0),
+                (1.5, 17.0),
+                (12.0, 1.5),
+                (16.0, 20.5),
+            )
         ]
         things += [tree(rng, 6.0).moved((*at, -0.1)) for at in ((4.0, 19.0), (22.5, 7.0))]
         things += [car().moved((*at, 0.0), 1.4) for at in ((7.0, 2.5), (19.5, 19.0))]
         things.append(gable((0, 0, -0.2), (3.6, 2.6, 2.2), 1.0, 0.25).moved((20.5, 14.5, 0.0), 0.1))
         mesh = merge([floor, *walls, *things])
-        return Site(
-            mesh, (2.5, 2.5, 2.6), (LENGTH - 2.5, WIDTH - 2.5, 5.0), pad_below=0.2, speed=1.2
+        x, y = MIDDLE
+        around = tuple(
+            (x + a, y + b, z)
+            for a, b, z in ((-6, -5.5, 3), (6, -5.5, 5), (6, 5.5, 3), (-6, 5.5, 5))
         )
+        low, high = (2.5, 2.5, 2.6), (LENGTH - 2.5, WIDTH - 2.5, 5.5)
+        return Site(mesh, low, high, pad_below=0.2, speed=1.6, route=around)
 
     return build

@@ -128,6 +128,8 @@ def test_tiles_and_their_index_make_a_folder(run, bentwing, tmp_path):
         (("--polygon", "none.geojson"), 3, "no such file"),
         (("--times", "500,600"), 2, "the run has"),
         (("--epsg", "25832"), 2, "where on the Earth"),
+        (("--map-format", "e57", "--normals"), 2, "no normals; write LAZ"),
+        (("--attributes", "ambient"), 3, "no field ambient; attributes can be none"),
         (("--trajectory-format", "gpx"), 2, "gpx"),
     ],
 )

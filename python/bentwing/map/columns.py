@@ -76,12 +76,13 @@ def further_fields(first: MapChunk, normals: tuple[str, ...] = NORMALS) -> list[
 def fill_further(
     table: NDArray[np.void], chunk: MapChunk, normals: tuple[str, ...] = NORMALS
 ) -> None:
-    """Put these columns of a chunk into a table; what the chunk does not have stays as it is."""
-    if chunk.normals is not None and normals[0] in (table.dtype.names or ()):
+    """Put these columns of a chunk into a table; what only one of them has is left out, or stays."""
+    there = set(table.dtype.names or ())
+    if chunk.normals is not None and normals[0] in there:
         for axis, name in enumerate(normals):
             table[name] = chunk.normals[:, axis]
     if chunk.attributes is not None:
-        for name in chunk.attributes.dtype.names or ():
+        for name in there.intersection(chunk.attributes.dtype.names or ()):
             table[name] = chunk.attributes[name]
 
 

@@ -54,6 +54,24 @@ def require_format(map_format: str) -> MapFormat:
     raise UsageError(msg)
 
 
+def require_room(map_format: str, *, normals: bool, attributes: bool) -> None:
+    """Refuse a format that cannot hold what is asked for.
+
+    Raises
+    ------
+    UsageError
+    """
+    asked = [
+        name for name, is_asked in (("normals", normals), ("attributes", attributes)) if is_asked
+    ]
+    if map_format == "e57" and asked:
+        msg = (
+            f"E57 maps hold coordinates and intensities only, no {' or '.join(asked)}; write "
+            "LAZ, COPC, PLY or PCD"
+        )
+        raise UsageError(msg)
+
+
 def require_package(map_format: MapFormat) -> Any:  # noqa: ANN401 - the packages have no types
     """Import the optional package of a format.
 

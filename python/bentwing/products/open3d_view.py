@@ -86,7 +86,7 @@ def _path(o3d: Any, contents: Contents) -> Any:  # noqa: ANN401
     lines = to_open3d(contents.trajectory)
     lines.point["positions"] = lines.point["positions"].to(o3d.core.float32)  # all it can draw
     n = len(lines.line.indices)
-    lines.line["colors"] = o3d.core.Tensor(np.tile(np.float32(_PATH_COLOUR), (n, 1)))
+    lines.line["colors"] = o3d.core.Tensor(np.tile(np.array(_PATH_COLOUR, np.float32), (n, 1)))
     return lines
 
 

@@ -19,7 +19,7 @@ from bentwing.closing.georeference.settings import GeoreferenceSettings
 from bentwing.closing.global_registration.settings import GlobalSettings
 from bentwing.closing.loop_file import NamedLoop  # noqa: TC001 - pydantic reads it
 from bentwing.map.clean import CleanSettings
-from bentwing.map.formats import MapFormat, require_format
+from bentwing.map.formats import MapFormat, require_format, require_room
 from bentwing.odometry import (
     ESTIMATORS,
     ContinuousSettings,
@@ -85,6 +85,11 @@ class MapSettings(Settings):
             msg = f"give 0 for all points, or {SMALLEST_SPACING:g} m and more, not {spacing:g} m"
             raise ValueError(msg)
         return spacing
+
+    @model_validator(mode="after")
+    def _has_room(self) -> Self:
+        require_room(self.map_format, normals=self.normals, attributes=False)
+        return self
 
     def to_json(self) -> dict[str, Any]:
         """Return the settings in plain JSON types, as run.json has them."""
@@ -176,6 +181,7 @@ class RunSettings(MapSettings):
 
     def carrying(self, attributes: tuple[str, ...]) -> Self:
         """Return the same with these further fields of the lidar's points in the map."""
+        require_room(self.map_format, normals=False, attributes=bool(attributes))
         return self.model_copy(update={"payload": self.payload.carrying(attributes)})
 
     @property

@@ -181,6 +181,23 @@ def test_rows_have_normals_and_attributes_under_the_names_of_the_format(tmp_path
     assert positions == sorted(positions)
 
 
+@pytest.mark.parametrize("kind", ["laz", "ply"])
+def test_chunks_of_runs_with_different_fields_share_a_file(tmp_path, kind):
+    """As in a merged map; the first one decides, and what a later one lacks is zero."""
+    first, second = with_further(), with_further()
+    other = np.ones(len(second), [("ambient", "u1"), ("near_ir", "<u2")])
+    with open_map(tmp_path / f"map.{kind}", kind, ORIGIN_NS) as writer:
+        writer.write(first)
+        writer.write(replace(second, attributes=other, times=second.times + 20.0))
+        writer.write(replace(second, attributes=None, normals=None, times=second.times + 40.0))
+    assert writer.n_points == 3 * len(first)
+    if kind == "laz":
+        las = laspy.read(tmp_path / "map.laz")
+        assert "ambient" not in las.point_format.extra_dimension_names
+        assert (las["near_ir"][300:600] == 1).all()
+        assert not las["near_ir"][600:].any()
+
+
 def test_a_structured_column_leaves_the_others_aligned(tmp_path):
     """Where chunks wait on the disk, whose rows the core reads as they are."""
     chunk = with_further(301)

@@ -13,7 +13,7 @@ from bentwing.base.arguments import thread_count
 from bentwing.base.errors import UsageError
 from bentwing.base.new_file import require_new
 from bentwing.base.progress import as_progress
-from bentwing.map.formats import FORMATS, MAP_FORMATS, require_format
+from bentwing.map.formats import FORMATS, MAP_FORMATS, require_format, require_room
 from bentwing.map.write_tiles import write_tiles
 from bentwing.map.writer import open_map
 from bentwing.recording.preprocess.read_ahead import read_ahead
@@ -119,6 +119,7 @@ def export(
             raise UsageError(msg)
         return _export_trajectory(Finished.open(run), out, kind)
     wanted = require_format(map_format) if map_format is not None else _map_format_of(out)
+    require_room(wanted, normals=bool(options.normals), attributes=bool(options.attributes))
     target = out if tiles is None else _without_suffix(out, wanted)
     require_new(target)
     if tiles is not None and (tiles != int(tiles) or tiles < 1):

@@ -136,6 +136,10 @@ class Points:
         _require_some(run, options, target, None)
         try:
             sources = [source.carrying(options.attributes) for source in run.sources()]
+            if options.attributes is not None:
+                for source in sources:
+                    with source.part():
+                        pass  # which refuses fields that the recording does not have
         except BentwingError as error:
             msg = f"{run.run.folder}: {reason}, so the recording has to be read again: {error}"
             raise type(error)(msg) from error

@@ -234,3 +234,9 @@ def test_a_run_with_printed_settings_is_the_same_run(bentwing, office, tmp_path)
         assert bentwing("map", recording, *options, "-o", tmp_path / out, *short).code == 0
     for name in ("trajectory.txt", "odometry.txt", "map.laz"):
         assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes()
+
+
+def test_a_head_without_a_described_imu_is_stored_as_such():
+    """A run is read again by what its record says of the head."""
+    stored = RunSettings().to_json()["payload"]
+    assert not Payload.model_validate(stored).describes_imu

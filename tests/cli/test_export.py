@@ -110,6 +110,25 @@ def test_a_run_without_a_map_is_exported_from_its_recording(office, bentwing, tm
     assert len(read_points(tmp_path / "a.ply")) > 1000
 
 
+def test_normals_are_found_from_the_map_and_point_to_the_sensor(run, bentwing, tmp_path):
+    said = bentwing("export", run, "-o", tmp_path / "normals.laz", "--normals")
+    assert said.code == 0, said.err
+    assert "from map.laz" in said.err
+    las, way = laspy.read(tmp_path / "normals.laz"), Run.load(run).trajectory
+    assert len(las) == len(read_points(run / "map.laz"))
+    normals = np.stack([las[f"normal_{axis}"] for axis in "xyz"], axis=1)
+    known = np.isfinite(normals[:, 0])
+    assert known.mean() > 0.95
+    times = las.gps_time - las.gps_time.min() + way.times[0]
+    sensors = np.stack([np.interp(times, way.times, column) for column in way.positions.T], axis=1)
+    towards = sensors - las.xyz
+    facing = np.einsum("ni,ni->n", normals, towards) > 0
+    assert facing[known].mean() > 0.99
+    # an office is made of walls, floors and ceilings along three axes of its own
+    up = np.abs(normals[known][:, 2])
+    assert ((up > 0.99) | (up < 0.1)).mean() > 0.7
+
+
 def test_tiles_and_their_index_make_a_folder(run, bentwing, tmp_path):
     said = bentwing("export", run, "-o", tmp_path / "site.laz", "--tiles", "5")
     assert said.code == 0, said.err
@@ -179,3 +198,28 @@ def test_a_merged_map_is_exported_from_its_map_and_from_its_recordings(
     }
     assert {"/tf", "/map_points"} < topics
     assert len(topics) == 6
+
+
+@pytest.mark.slow
+def test_fields_of_a_real_recording_reach_the_map_and_its_exports(shared_data, bentwing, tmp_path):
+    """And a run without a payload, of a lidar without an IMU, is read again from its recording."""
+    said = bentwing("map", shared_data / "garage_hdl32.bag", "-o", tmp_path / "run", "--attributes", "time,ring",
+                    "--no-refine", "--start", "2", "--duration", "2", "--map-spacing", "0.05", "-q")  # fmt: skip
+    assert said.code == 0, said.err
+    las = laspy.read(tmp_path / "run" / "map.laz")
+    assert np.array_equal(las["sensor_ring"], las["ring"])
+    assert 0.09 < las["sensor_time"].max() <= 0.1001
+    assert (
+        bentwing(
+            "export", tmp_path / "run", "-o", tmp_path / "one.laz", "--attributes", "time"
+        ).code
+        == 0
+    )
+    names = [*laspy.read(tmp_path / "one.laz").point_format.extra_dimension_names]
+    assert "sensor_time" in names
+    assert "sensor_ring" not in names
+    said = bentwing("export", tmp_path / "run", "-o", tmp_path / "all.laz", "--spacing", "0")
+    assert "from the recording" in said.err
+    fine = laspy.read(tmp_path / "all.laz")
+    assert len(fine) > len(las)
+    assert np.array_equal(fine["sensor_ring"], fine["ring"])

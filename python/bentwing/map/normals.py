@@ -12,6 +12,7 @@ from scipy.spatial import cKDTree
 from bentwing.base.array_spool import ArraySpool, columns_of
 from bentwing.base.memory import give_back
 from bentwing.base.moments import Planes
+from bentwing.base.search_tree import nearest
 from bentwing.base.voxels import voxel_keys
 from bentwing.map.chunk import MapChunk, beams_of
 from bentwing.map.voxel_views import VoxelViews
@@ -28,17 +29,15 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 SPACING = 0.05  # m
-_NEIGHBOURS = 16
-_FEWEST = 6  # of them, the point among them, that say where a surface lies
+_NEIGHBOURS = range(1, 17)  # the point among them
+_FEWEST = 6  # of them that say where a surface lies
 _ENOUGH = 10.0  # points of a voxel, beyond which its mean gets no better by more
 _REACH = 4.0  # spacings, to the farthest of them
 _TOGETHER = 100_000  # points whose neighbours are in memory at once
 _STEP = 1.0  # m along a normal, which says where it points in other coordinates
 
 
-def with_normals(
-    chunks: Iterable[MapChunk], folder: Path, *, threads: int | None = None
-) -> Generator[MapChunk, None, None]:
+def with_normals(chunks: Iterable[MapChunk], folder: Path) -> Generator[MapChunk, None, None]:
     """Give every point the normal of its voxel, towards the lidar that measured it.
 
     All chunks pass once before the first one comes out; meanwhile they are on the disk.
@@ -47,7 +46,6 @@ def with_normals(
     ----------
     chunks : with the beams of their points; NaN where nobody knows from where a point was seen
     folder : of the temporary file, about 60 bytes per point
-    threads : default: all cores
 
     Yields
     ------
@@ -66,7 +64,7 @@ def with_normals(
         views = gathered.result()
         keys, normals = np.empty(0, np.int64), np.empty((0, 3))
         if views is not None:
-            found, known = find_normals(views, gathered.edge, threads)
+            found, known = find_normals(views, gathered.edge)
             keys, normals = views.keys[known], found[known]
         edge = gathered.edge
         del views, gathered
@@ -91,9 +89,7 @@ def _of_voxels(
     return found
 
 
-def find_normals(
-    views: Views, spacing: float, threads: int | None = None
-) -> tuple[Array, NDArray[np.bool_]]:
+def find_normals(views: Views, spacing: float) -> tuple[Array, NDArray[np.bool_]]:
     """Return normals (K, 3) towards the sensor, and where enough neighbours say which (K,).
 
     Neighbours that were seen from the opposite direction are of the other side of a thin wall.
@@ -102,15 +98,15 @@ def find_normals(
     normals, known = np.empty_like(views.points), np.empty(len(views.points), np.bool_)
     for first in range(0, len(normals), _TOGETHER):
         rows = slice(first, first + _TOGETHER)
-        normals[rows], known[rows] = _normals(tree, views, rows, _REACH * spacing, threads or -1)
+        normals[rows], known[rows] = _normals(tree, views, rows, _REACH * spacing)
     return normals, known
 
 
 def _normals(
-    tree: cKDTree, views: Views, rows: slice, reach: float, threads: int
+    tree: cKDTree, views: Views, rows: slice, reach: float
 ) -> tuple[Array, NDArray[np.bool_]]:
     points, towards = views.points[rows], views.towards[rows]
-    distances, near = tree.query(points, _NEIGHBOURS, distance_upper_bound=reach, workers=threads)
+    distances, near = nearest(tree, points, _NEIGHBOURS, reach)
     there = np.isfinite(distances)
     near = np.where(there, near, 0)
     there &= np.einsum("nki,ni->nk", views.towards[near], towards) > 0.0

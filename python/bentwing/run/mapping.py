@@ -106,7 +106,7 @@ def write_map(
                 ahead(chunks), folder.path, counts=counts, record=refined, threads=settings.threads
             )
         if settings.normals:
-            chunks = with_normals(ahead(chunks), folder.path, threads=settings.threads)
+            chunks = with_normals(ahead(chunks), folder.path)
         kept = ahead(sample.watch(thin(chunks, settings.map_spacing, counts)))
         writer = stack.enter_context(_open(path, settings, origin_ns, placed))
         for chunk in kept:

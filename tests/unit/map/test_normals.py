@@ -65,13 +65,6 @@ def test_normals_of_a_plane_are_as_exact_as_its_noise_allows(tmp_path):
     assert np.median(angles) < 1.2 * np.degrees(1.18 * 0.005 / 10 / 0.045)
 
 
-def test_threads_do_not_change_normals(tmp_path):
-    points, _ = tilted(np.random.default_rng(101))
-    chunk = seen_from(points, np.array([0.0, 0.0, 3.0]))
-    found = [next(with_normals(iter([chunk]), tmp_path, threads=n)).normals for n in (1, 2, 4)]
-    assert found[0].tobytes() == found[1].tobytes() == found[2].tobytes()
-
-
 def test_both_sides_of_a_plate_have_normals_of_their_own(tmp_path):
     rng = np.random.default_rng(141)
     places = rng.uniform(-1, 1, (40_000, 2))

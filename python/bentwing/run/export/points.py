@@ -196,9 +196,7 @@ class Points:
         with progress.stage("export", stored.n_points, "points") as shown:
             read = _shown(stored.chunks(self._run.run.start_ns), shown.advance)
             if self._options.has_normals(self._run) and not self._run.has_normals:
-                read = with_normals(
-                    _seen(read, open_map_of(self._run.run.folder)), folder, threads=threads
-                )
+                read = with_normals(_seen(read, open_map_of(self._run.run.folder)), folder)
             elif not self._options.has_normals(self._run):
                 read = (replace(chunk, normals=None) for chunk in read)
             if self._options.attributes is not None:
@@ -281,7 +279,7 @@ def _again(  # noqa: PLR0917 - private, called once
     if options.refines(run):
         cleaned = refine(cleaned, folder, counts=counts, threads=threads)
     if options.has_normals(run):
-        cleaned = with_normals(cleaned, folder, threads=threads)
+        cleaned = with_normals(cleaned, folder)
     for chunk in cleaned:
         yield with_own_times(chunk, late)
 

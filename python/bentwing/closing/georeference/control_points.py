@@ -9,13 +9,14 @@ along the normal. A mark on a floor so tells the height, one on a wall the way a
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from bentwing.closing.georeference.standing import Standing
     from bentwing.map.chunk import MapChunk
 
     Array = NDArray[np.float64]
@@ -24,7 +25,11 @@ MIN_POINTS = 20
 MAX_POINTS = 40_000  # of one mark in memory
 MIN_SPREAD = 0.1  # of the radius, across: points of one scan line have no normal
 MIN_SIGMA = 0.003  # m; marks are not surveyed better
+PICKED = 0.02  # m, to which a mark is found in a cloud
 _TRIMMED = 3.0
+
+
+Use: TypeAlias = Literal["control", "check"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,13 +44,17 @@ class ControlPoint:
     radius : m, of the surface around it that is flat
     use : `control` points constrain the map, `check` points only tell how good it is
     picked : (3,) m, where the mark was seen in the map; None where nobody has said
+    sigma : m, standard deviation of that place
+    standing : when the carrier stood on the mark, which says where it is in the map
     """
 
     name: str
     position: Array
     radius: float
-    use: Literal["control", "check"]
+    use: Use
     picked: Array | None = None
+    sigma: float = PICKED
+    standing: Standing | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,6 +19,8 @@ from bentwing.closing.georeference.placement import (
 from bentwing.closing.georeference.projection import MapProjection
 from bentwing.closing.georeference.shares import shares_of
 from bentwing.closing.georeference.site import Site
+from bentwing.closing.georeference.snooping import contradictions
+from bentwing.closing.georeference.standing import with_places
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -28,6 +30,7 @@ if TYPE_CHECKING:
     from bentwing.base.trajectory import Trajectory
     from bentwing.closing.georeference.receivers import Receivers
     from bentwing.closing.georeference.settings import GeoreferenceSettings
+    from bentwing.closing.georeference.snooping import Contradiction, Fit
     from bentwing.map.chunk import MapChunk
 
     Array = NDArray[np.float64]
@@ -96,7 +99,10 @@ def georeference(
     UsageError, InputError
         If the projected system or the file of the control points cannot be used.
     """
-    listed = read_control_points(settings.control_points) if settings.control_points else None
+    listed = None
+    if settings.control_points is not None:
+        listed = read_control_points(settings.control_points)
+        listed = replace(listed, points=with_places(listed.points, trajectory))
     if settings.mode == "off" or (receivers is None and listed is None):
         return None
     system = None if settings.epsg is None else ProjectedSystem.of_epsg(settings.epsg)
@@ -104,6 +110,7 @@ def georeference(
     placement, used = site.first_placement()
     marks: Marks | None = None
     before: list[float | None] = []
+    found: list[Contradiction] = []
     slack = site.slack()
     if listed is not None and chunks is not None:
         targets = site.targets_of(listed)
@@ -117,10 +124,11 @@ def georeference(
             )
             raise NotEnoughDataError(msg)
         before = marks.residuals(placement)
-        for i in range(_MEASURED):
-            surfaces, _ = marks.surfaces()
-            placement, used = place(site.positions, surfaces, placement)
-            marks.measure(placement, slack if i == 0 else min(slack, 0.1))
+        placement, used = _measured(site, marks, placement, slack)
+        found = contradictions(marks, _fit_of(site, marks, placement), site.n_known)
+        marks.false = {one.number for one in found if one.is_certain and one.number in marks.used}
+        if marks.false:
+            placement, used = _measured(site, marks, placement, slack)
     bent = trajectory
     if settings.mode == "constraints":
         for _ in range(_BENT):
@@ -133,9 +141,29 @@ def georeference(
         reach=reach,
         marks=marks,
         before=before,
+        contradicting=found,
         mode=settings.mode,
         columns={} if listed is None else listed.columns,
     )
+
+
+def _measured(
+    site: Site, marks: Marks, placement: Placement, slack: float
+) -> tuple[Placement, NDArray[np.bool_]]:
+    """Place the map, and find the surfaces around the marks anew where they are then."""
+    used = np.empty(0, np.bool_)
+    for i in range(_MEASURED):
+        surfaces, _ = marks.surfaces(marks.used)
+        placement, used = place(site.positions_of(marks, marks.used), surfaces, placement)
+        marks.measure(placement, slack if i == 0 else min(slack, 0.1))
+    return placement, used
+
+
+def _fit_of(site: Site, marks: Marks, start: Placement) -> Fit:
+    def fit(numbers: Sequence[int]) -> Placement:
+        return place(site.positions_of(marks, numbers), marks.surfaces(numbers)[0], start)[0]
+
+    return fit
 
 
 def _finished(
@@ -147,6 +175,7 @@ def _finished(
     reach: float,
     marks: Marks | None,
     before: Sequence[float | None],
+    contradicting: Sequence[Contradiction],
     mode: str,
     columns: Mapping[str, str],
 ) -> Georeferenced:
@@ -166,7 +195,8 @@ def _finished(
         rows = marks.table(placement, before)
         record["control_points"], record["residuals"] = rows, summary(rows)
         record["control_point_columns"] = dict(columns)
-        warnings += marks.warnings(placement)
+        record["contradictions"] = [one.record(marks) for one in contradicting]
+        warnings += marks.warnings()
     if trajectory is not site.original:
         moved = np.linalg.norm(trajectory.positions - site.original.positions, axis=1)
         record["bent_by"] = float(moved.max())

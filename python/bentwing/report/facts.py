@@ -107,7 +107,9 @@ def left_out(record: Mapping[str, Any], texts: Texts) -> list[str]:
     if fixes.get("rejected"):
         said.append(texts.left_fixes.format(n=fixes["rejected"], of=fixes.get("fixes", 0)))
     marks = (record.get("georeference") or {}).get("control_points") or []
-    unused = [str(row["id"]) for row in marks if row["residual"] is None]
+    unused = [
+        str(row["id"]) for row in marks if row["residual"] is None and row.get("picked_off") is None
+    ]
     if unused:
         said.append(texts.left_marks.format(names=", ".join(unused)))
     return said

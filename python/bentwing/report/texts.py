@@ -52,6 +52,7 @@ class Texts:
     plan_note: str = "Height by colour; the line is the way of the sensor, the circle its start."
     plan_north: str = "Grid north is up; the grid has the coordinates of the system below."
     plan_local: str = "The grid is that of the map's own frame, in metres."
+    plan_site: str = "The grid is that of the control points, in metres; its y axis points up."
     plan_roof: str = (
         "What is above the sensor is left out, so that the roof does not hide the floor."
     )
@@ -90,6 +91,8 @@ class Texts:
     sideways: str = "sideways"
     mixed: str = "sloped"
     not_used: str = "not used: no flat surface"
+    only_seen: str = "where it was seen"
+    contradicts: str = "not used: contradicts the others"
     map: str = "Map"
     no_points: str = "No points were mapped."
     no_map: str = "No map was asked for."

@@ -210,7 +210,8 @@ def _projected(
     if site.frame is None or site.system is None:
         zero = np.zeros(3)
         linear = {"map": zero, "projected": placement.translation, "matrix": placement.rotation}
-        return None, {"heading": placement.heading, "linear": linear}
+        described = {"translation": placement.translation, "std": placement.std_record()}
+        return None, {"heading": placement.heading, **described, "linear": linear}
     low = trajectory.positions.min(axis=0) - reach
     high = trajectory.positions.max(axis=0) + reach
     projection = MapProjection.over(low, high, site.frame, placement, site.system)

@@ -7,7 +7,7 @@ Gravity is known to the estimators far better than fixes could tell it, so the m
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -47,6 +47,10 @@ class Placement:
         """(3, 3)."""
         c, s = np.cos(self.heading), np.sin(self.heading)
         return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+    def std_record(self) -> dict[str, Any]:
+        """Return the standard deviations as run.json has them."""
+        return {"heading": float(self.std[0]), "translation": self.std[1:]}
 
     def to_level(self, points: Array) -> Array:
         """East, north, up (N, 3) of map points (N, 3)."""

@@ -187,10 +187,13 @@ def _finished(
         record["fixes"], said = _of_fixes(site.receivers, gaps, used)
         warnings += said
     if placement.std[0] > DOUBTFUL_HEADING_STD:
-        warnings.append(
-            f"the heading of the map on the Earth is known to {np.degrees(placement.std[0]):.1f}° "
-            "only: fly a longer way, or give control points"
+        known = f"the heading of the map is known to {np.degrees(placement.std[0]):.1f}° only"
+        advice = (
+            "give marks farther apart"
+            if site.receivers is None
+            else "fly a longer way, or give control points"
         )
+        warnings.append(f"{known}: {advice}")
     if marks is not None:
         rows = marks.table(placement, before)
         record["control_points"], record["residuals"] = rows, summary(rows)

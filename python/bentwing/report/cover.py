@@ -37,14 +37,14 @@ def cover(drawn: Drawn) -> str:
         sections.tiles(record, drawn.trajectory, drawn.points, drawn.coverage, texts),
     ]
     if drawn.views is not None:
+        surveyed = marks_section(record.get("georeference"), texts)
+        kind = "surveyed" if surveyed else "plan"
         parts += [
-            _plan(record, drawn.views, texts),
+            f'<div class="{kind}">{_plan(record, drawn.views, texts)}{surveyed}</div>',
             _words(texts.coordinates, facts.coordinates(record, texts)),
-            marks_section(record.get("georeference"), texts),
             _words(texts.left_out, _left_out(record, texts)),
         ]
-    kind = "cover surveyed" if _marks(record) else "cover"
-    return f'<section class="{kind}">{"".join(parts)}</section>'
+    return f'<section class="cover">{"".join(parts)}</section>'
 
 
 def _made(record: Mapping[str, Any], texts: Texts) -> str:

@@ -56,10 +56,15 @@ def subject(record: Mapping[str, Any]) -> str:
 
 
 def _head(record: Mapping[str, Any]) -> str:
+    """Name the sensor head, or those of all runs."""
     payload = (record.get("settings") or {}).get("payload") or {}
-    kind = (payload.get("lidar") or {}).get("kind") or ""
-    name = payload.get("name") or ""
-    return f"{name} ({kind})" if name and kind else name or kind
+    own = {"name": payload.get("name"), "kind": (payload.get("lidar") or {}).get("kind")}
+    heads = [run["head"] for run in record.get("runs") or [] if "head" in run] or [own]
+    named = dict.fromkeys(
+        f"{name} ({kind})" if name and kind else name or kind
+        for name, kind in ((head["name"] or "", head["kind"] or "") for head in heads)
+    )
+    return ", ".join(named)
 
 
 def _spans(

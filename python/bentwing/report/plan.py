@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from bentwing.report.picture import View
     from bentwing.report.way import Way
 
-_LEFT, _FOOT, _TOP, _SIZE = 34, 96, 30, 18  # pixels: margins, and the height of letters
+_LEFT, _FOOT, _TOP, _SIZE = 38, 100, 30, 22  # pixels: margins, and the height of letters
 _LINES = 6  # of the grid, about, along the longer side
 _MARK = 8  # pixels, half of a mark's size
 

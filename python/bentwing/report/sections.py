@@ -77,7 +77,13 @@ def capital(sentence: str) -> str:
 def expected(record: Mapping[str, Any], texts: Texts) -> str:
     """Say how accurate the result is expected to be."""
     found = record.get("expected_accuracy")
-    said = ExpectedAccuracy(**found).sentence() if found else texts.accuracy_none
+    checked = ((record.get("georeference") or {}).get("residuals") or {}).get("check")
+    if found:
+        said = ExpectedAccuracy(**found).sentence()
+    elif checked:
+        said = texts.accuracy_checked.format(rms=1e3 * checked["rms"], n=checked["n"])
+    else:
+        said = texts.accuracy_none
     return _BEFORE_UNIT.sub("\N{NO-BREAK SPACE}", said)
 
 

@@ -42,6 +42,7 @@ class Texts:
     finished: str = "Map finished"
     worth_knowing: str = "Worth knowing:"
     accuracy_none: str = "No accuracy is stated: this kind of result has no error estimate of its own; see the checks below."
+    accuracy_checked: str = "Accuracy: {n} check points are off by {rms:.1f} mm root mean square; they are listed below."
     area: str = "area seen from above"
     volume: str = "volume between lowest and highest surface"
     length: str = "length of the way"

@@ -33,7 +33,11 @@ def merging_section(merging: Mapping[str, Any] | None) -> str:
 def _groups(merging: Mapping[str, Any]) -> str:
     """Tell what belongs together."""
     rows = [
-        ("this one" if one["folder"] == "." else one["folder"], ", ".join(one["runs"]), str(one["n_links"]))
+        (
+            "this one" if one["folder"] == "." else one["folder"],
+            ", ".join(one["runs"]),
+            str(one["n_links"]),
+        )
         for one in merging.get("maps") or []
     ]
     if rows:

@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 DOUBTFUL_HEADING_STD = np.radians(1.0)  # half a metre at the end of a lidar's reach
 _MEASURED = 5  # times that surfaces are found anew
 _BENT = 2
+_GEOID = 8.0  # m; where the geoid is nearer to the ellipsoid, nobody can tell the two by a flight
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,11 +200,26 @@ def _finished(
         record["control_points"], record["residuals"] = rows, summary(rows)
         record["control_point_columns"] = dict(columns)
         record["contradictions"] = [one.record(marks) for one in contradicting]
-        warnings += marks.warnings()
+        warnings += [*marks.warnings(), *_other_heights(site, marks)]
     if trajectory is not site.original:
         moved = np.linalg.norm(trajectory.positions - site.original.positions, axis=1)
         record["bent_by"] = float(moved.max())
     return Georeferenced(trajectory, projection, placement, record, warnings)
+
+
+def _other_heights(site: Site, marks: Marks) -> list[str]:
+    """Say that marks are above or below all fixes, as heights above the sea are."""
+    if not len(site.times):
+        return []
+    gap = float(np.median(marks.targets[:, 2]) - np.median(site.positions.targets[:, 2]))
+    if abs(gap) < _GEOID or any(marks.planes):
+        return []
+    where = "above" if gap > 0 else "below"
+    return [
+        f"the control points lie {abs(gap):.0f} m {where} the GNSS fixes, whose heights are above the "
+        "ellipsoid; if those of the control points are above the sea, choose a system with such heights by "
+        "--epsg"
+    ]
 
 
 def _projected(

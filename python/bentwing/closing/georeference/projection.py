@@ -95,7 +95,7 @@ class MapProjection:
         return {
             "epsg": self.system.epsg,
             "crs": self.system.name,
-            "heights": "above the WGS 84 ellipsoid, unless the system has its own",
+            "heights": self.system.heights,
             "origin": {
                 "longitude": self.frame.longitude,
                 "latitude": self.frame.latitude,

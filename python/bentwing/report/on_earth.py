@@ -10,7 +10,7 @@ import numpy as np
 from bentwing.report.sections import MINUS, shares_table, table
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from bentwing.report.sections import Row
 _TOLD = {
@@ -24,7 +24,7 @@ def on_earth_section(found: Mapping[str, Any] | None) -> str:
     if not found:
         return ""
     fixes = found.get("fixes") or {}
-    rows = [*_place(found), *_fixes(fixes)]
+    rows = [*_place(found), *_fixes(fixes), *_antennas(found.get("antennas") or [])]
     if "bent_by" in found:
         rows.append(
             ("way bent towards fixes and marks by at most", f"{1e3 * found['bent_by']:.0f} mm")
@@ -53,6 +53,22 @@ def _place(found: Mapping[str, Any]) -> list[Row]:
             ("point scale of the projection", f"{found['point_scale']:.6f}"),
         ]
     return rows
+
+
+def _antennas(antennas: Sequence[Mapping[str, Any]]) -> list[Row]:
+    """Say where the fixes have those antennas that the payload leaves to them."""
+    return [
+        (
+            f"antenna{of} in the IMU frame, by the fixes",
+            ", ".join(
+                f"{name} {metres:.3f} ± {std:.3f} m".replace("-", MINUS)
+                for name, metres, std in zip("xyz", one["lever_arm"], one["std"], strict=True)
+            ),
+        )
+        for one in antennas
+        if one["used"]
+        for of in [f" of {one['run']}" if one["run"] else ""]
+    ]
 
 
 def _fixes(fixes: Mapping[str, Any]) -> list[Row]:

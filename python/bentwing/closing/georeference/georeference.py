@@ -10,6 +10,7 @@ import numpy as np
 
 from bentwing.base.errors import NotEnoughDataError
 from bentwing.base.geodesy import ProjectedSystem
+from bentwing.closing.georeference.antenna import find_antennas
 from bentwing.closing.georeference.control_point_file import read_control_points
 from bentwing.closing.georeference.marks import Marks, summary
 from bentwing.closing.georeference.placement import (
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bentwing.base.trajectory import Trajectory
+    from bentwing.closing.georeference.antenna import Antenna
     from bentwing.closing.georeference.receivers import Receivers
     from bentwing.closing.georeference.settings import GeoreferenceSettings
     from bentwing.closing.georeference.snooping import Contradiction, Fit
@@ -108,7 +110,7 @@ def georeference(
         return None
     system = None if settings.epsg is None else ProjectedSystem.of_epsg(settings.epsg)
     site = Site.of(trajectory, receivers, segments, system, listed)
-    placement, used = site.first_placement()
+    site, placement, used, antennas = _with_antennas(site)
     marks: Marks | None = None
     before: list[float | None] = []
     found: list[Contradiction] = []
@@ -143,9 +145,22 @@ def georeference(
         marks=marks,
         before=before,
         contradicting=found,
+        antennas=antennas,
         mode=settings.mode,
         columns={} if listed is None else listed.columns,
     )
+
+
+def _with_antennas(site: Site) -> tuple[Site, Placement, NDArray[np.bool_], list[Antenna]]:
+    """Place the map by the fixes, with the antennas where the fixes have them if the payload lets them."""
+    placement, used = site.first_placement()
+    antennas = find_antennas(site, placement)
+    for antenna in antennas:
+        if antenna.is_free:
+            site = site.with_antenna(antenna.run, antenna.moved)
+    if any(antenna.is_free for antenna in antennas):
+        placement, used = site.first_placement()
+    return site, placement, used, antennas
 
 
 def _measured(
@@ -177,6 +192,7 @@ def _finished(
     marks: Marks | None,
     before: Sequence[float | None],
     contradicting: Sequence[Contradiction],
+    antennas: Sequence[Antenna],
     mode: str,
     columns: Mapping[str, str],
 ) -> Georeferenced:
@@ -186,7 +202,9 @@ def _finished(
     if site.receivers is not None:
         gaps = placement.to_level(site.antenna(trajectory)[0]) - site.positions.targets
         record["fixes"], said = _of_fixes(site.receivers, gaps, used)
+        record["antennas"] = [antenna.record() for antenna in antennas]
         warnings += said
+        warnings += [a.sentence() for a in antennas if a.is_elsewhere and not a.is_free]
     if placement.std[0] > DOUBTFUL_HEADING_STD:
         known = f"the heading of the map is known to {np.degrees(placement.std[0]):.1f}° only"
         advice = (

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 GATE = 16.27  # of three squared residuals in units of their noise; 0.1 % are beyond
 # Errors of fixes last: those within so many seconds are worth one.
 INDEPENDENT = 20.0
-_MEDIAN = 2.366  # of the same
+MEDIAN = 2.366  # of the same
 _N_PAIRS = 300
 _ITERATIONS = 30
 _CONVERGED = 1e-9
@@ -149,7 +149,7 @@ def place(
         squared = _squared_residuals(positions, found)
         if len(squared):
             # Receivers are often too sure of themselves; never believe them more than they ask.
-            scale = max(1.0, float(np.median(squared)) / _MEDIAN)
+            scale = max(1.0, float(np.median(squared)) / MEDIAN)
             used = squared < GATE * scale
         step, covariance = _step(positions, used, scale, surfaces, found)
         found = Placement(

@@ -158,6 +158,15 @@ class Site:
             raise NotEnoughDataError(msg)
         return placement, used
 
+    def with_antenna(self, run: int, by: Array) -> Site:
+        """Return the site with the antenna of one run elsewhere, by (3,) m in the IMU frame."""
+        assert self.receivers is not None
+        receivers = self.receivers.moved(run, by)
+        p, q = self.original.interpolate(self.times)
+        levers = geometry.rotate(q, receivers.lever_arms)
+        positions = replace(self.positions, points=p + levers)
+        return replace(self, receivers=receivers, levers=levers, positions=positions)
+
     @property
     def n_known(self) -> int:
         """Number of measurements of the place beside those of marks."""

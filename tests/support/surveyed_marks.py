@@ -8,8 +8,10 @@ from dataclasses import dataclass
 
 import laspy
 import numpy as np
+import yaml
 
 from bentwing.base import geometry
+from bentwing.base.geodesy import LevelFrame, ProjectedSystem
 from bentwing.base.trajectory import read_tum
 from bentwing.evaluate.alignment import align
 from bentwing.evaluate.simulated import Truth
@@ -38,6 +40,32 @@ class SiteGrid:
         return (grid - self.shift) @ self.R
 
 
+@dataclass(frozen=True)
+class OnEarth:
+    """Coordinates of a projected system, of the simulated world of a recording with a receiver."""
+
+    folder: object
+    epsg: int
+
+    @property
+    def _frame(self):
+        where = yaml.safe_load((self.folder / "truth_georeference.yaml").read_text())
+        frame = LevelFrame(where["longitude"], where["latitude"], where["height"])
+        return (
+            frame,
+            SiteGrid(where["heading"], (0.0, 0.0, 0.0)),
+            ProjectedSystem.of_epsg(self.epsg),
+        )
+
+    def of(self, world):
+        frame, grid, system = self._frame
+        return system.from_geodetic(frame.to_geodetic(grid.of(world)))
+
+    def to_world(self, projected):
+        frame, grid, system = self._frame
+        return grid.to_world(frame.from_geodetic(system.to_geodetic(projected)))
+
+
 @dataclass
 class Seen:
     """A map in a frame of its own, and the true world: x_map = R x_world + t."""
@@ -63,26 +91,31 @@ class Seen:
 
     def places(self, rng, are_floors):
         """Places (K, 3) in the world on flat floors and walls that the map has, some metres apart."""
-        mesh = read_mesh(self.folder / "truth_scene.ply")
-        corners = mesh.vertices[mesh.triangles]
-        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        normals /= np.maximum(np.linalg.norm(normals, axis=1), 1e-12)[:, None]
         world = (np.array(laspy.read(self.run / "map.laz").xyz)[::20] - self.t) @ self.R
-        off, faces = Truth(self.folder).scene.distance(np.ascontiguousarray(world))
-        found = []
-        for is_floor in are_floors:
-            for i in rng.permutation(len(world)):
-                normal, point = normals[faces[i]], world[i] - off[i] * normals[faces[i]]
-                is_level = abs(normal[2]) > 0.99 and point[2] < 0.1
-                if not (is_level if is_floor else abs(normal[2]) < 0.05):
-                    continue
-                gaps = world - point
-                near = np.linalg.norm(gaps, axis=1) < 0.35
-                is_flat = near.sum() > 60 and np.ptp(gaps[near] @ normal) < FLAT
-                if is_flat and all(np.linalg.norm(point - other) > APART for other in found):
-                    found.append(point)
-                    break
-        return np.array(found)
+        return flat_places(self.folder, world, rng, are_floors)
+
+
+def flat_places(folder, world, rng, are_floors):
+    """Places (K, 3) on flat floors and walls near points (N, 3) of a map, some metres apart, in the simulated world."""
+    mesh = read_mesh(folder / "truth_scene.ply")
+    corners = mesh.vertices[mesh.triangles]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1), 1e-12)[:, None]
+    off, faces = Truth(folder).scene.distance(np.ascontiguousarray(world))
+    found = []
+    for is_floor in are_floors:
+        for i in rng.permutation(len(world)):
+            normal, point = normals[faces[i]], world[i] - off[i] * normals[faces[i]]
+            is_level = abs(normal[2]) > 0.99 and point[2] < 0.1
+            if not (is_level if is_floor else abs(normal[2]) < 0.05):
+                continue
+            gaps = world - point
+            near = np.linalg.norm(gaps, axis=1) < 0.35
+            is_flat = near.sum() > 60 and np.ptp(gaps[near] @ normal) < FLAT
+            if is_flat and all(np.linalg.norm(point - other) > APART for other in found):
+                found.append(point)
+                break
+    return np.array(found)
 
 
 def write_marks(path, marks, *, separator=",", decimal="."):

@@ -140,7 +140,7 @@ def refinement_sentence(found: Mapping[str, Any] | None, texts: Texts) -> str:
     if not found.get("moved"):
         return f"<p>{escape(texts.nothing_refined)}</p>"
     move, before, after = (1000 * found[name] for name in ("move", "sigma_before", "sigma"))
-    said = texts.refined.format(share=found["moved"], move=move, before=before, after=after)
+    said = texts.refined.format(share=100 * found["moved"], move=move, before=before, after=after)
     return f"<p>{escape(said)}</p>"
 
 
@@ -204,7 +204,7 @@ def shares_table(shares: Sequence[Mapping[str, Any]]) -> str:
     """Make the table of runs whose GNSS fixes place a merged map."""
 
     def metres(offset: Sequence[float] | None) -> str:
-        return DASH if offset is None else ", ".join(f"{value:+.3f}" for value in offset)
+        return DASH if offset is None else ", ".join(f"{value:+.3f}".replace("-", MINUS) for value in offset)
 
     cells = [
         (s["name"], f"{s['used']:,}", f"{s['rejected']:,}", metres(s["offset"])) for s in shares

@@ -99,7 +99,7 @@ class Texts:
     no_map: str = "No map was asked for."
     nothing_refined: str = "No point was moved: there is no surface that enough passes have seen."
     refined: str = (
-        "{share:.0%} of the points were moved along their beams to the surface that they measured "
+        "{share:.0f} % of the points were moved along their beams to the surface that they measured "
         "together, by {move:.1f} mm in the median; one standard deviation along the beam was "
         "{before:.1f} mm and is {after:.1f} mm. The pictures and the accuracy below show the points "
         "as measured."

@@ -101,7 +101,7 @@ class Source:
                     threads=threads,
                     counts=counts,
                 )
-            counts.update(dropped)
+                counts.update(part.recording.counts + dropped)
 
         return MapSource(estimate, self.start_ns, chunks)
 

@@ -130,3 +130,21 @@ def test_the_residuals_are_on_the_first_printed_page_and_no_page_is_blank(site):
     assert all(f"P{n}" in texts[0] for n in range(1, 9))
     assert "Left out of the map" in texts[0]
     assert min(inks) > 0.01
+
+
+def test_a_third_flight_is_found_in_the_merged_map(flights, site, made_once, tmp_path):
+    """All flights were simulated at the same time, so only the numbers of the runs tell their points apart."""
+    third = made_once(
+        "compound-3",
+        lambda folder: command("simulate", "compound", "--gnss", "rtk", "--seed", SEED,
+                               "--flight-seed", 3, "--duration", 25, "-o", folder),
+    )  # fmt: skip
+    run = tmp_path / "third"
+    command(
+        "localize", third / "recording.bag", "--map", site, "-p", third / "payload.yaml", "-o", run
+    )
+    command("export", run, "-o", tmp_path / "third.laz", "--spacing", 0.2)
+    las = laspy.read(tmp_path / "third.laz")
+    assert las.header.parse_crs().to_epsg() == EPSG
+    off = np.abs(Truth(third).distances(OnEarth(third, EPSG).to_world(np.array(las.xyz)[::5])))
+    assert np.median(off) < 0.01

@@ -204,7 +204,11 @@ def shares_table(shares: Sequence[Mapping[str, Any]]) -> str:
     """Make the table of runs whose GNSS fixes place a merged map."""
 
     def metres(offset: Sequence[float] | None) -> str:
-        return DASH if offset is None else ", ".join(f"{value:+.3f}".replace("-", MINUS) for value in offset)
+        return (
+            DASH
+            if offset is None
+            else ", ".join(f"{value:+.3f}".replace("-", MINUS) for value in offset)
+        )
 
     cells = [
         (s["name"], f"{s['used']:,}", f"{s['rejected']:,}", metres(s["offset"])) for s in shares

@@ -132,7 +132,7 @@ def test_the_residuals_are_on_the_first_printed_page_and_no_page_is_blank(site):
     assert min(inks) > 0.01
 
 
-def test_a_third_flight_is_found_in_the_merged_map(flights, site, made_once, tmp_path):
+def test_a_third_flight_is_found_in_the_merged_map(site, made_once, tmp_path):
     """All flights were simulated at the same time, so only the numbers of the runs tell their points apart."""
     third = made_once(
         "compound-3",

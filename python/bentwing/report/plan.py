@@ -155,11 +155,11 @@ def _marked(marks: Sequence[Mark], view: View) -> list[str]:
     taken = [(x - _MARK, y - _MARK, x + _MARK, y + _MARK) for x, y in places]
     drawn = [_symbol(x, y, mark.is_check) for mark, (x, y) in zip(marks, places, strict=True)]
     for mark, (x, y) in zip(marks, places, strict=True):
-        long = 0.62 * _SIZE * len(mark.name)
+        long = 0.66 * _SIZE * len(mark.name)
         corners = [(x + _MARK + 4, y + 6), (x - _MARK - 4 - long, y + 6),
                    (x - long / 2, y - _MARK - 5), (x - long / 2, y + _MARK + _SIZE)]  # fmt: skip
         for left, base in corners:
-            box = (left, base - _SIZE + 3, left + long, base + 2)
+            box = (left - 2, base - _SIZE, left + long + 2, base + 5)
             if not any(_overlap(box, other) for other in taken):
                 taken.append(box)
                 drawn.append(

@@ -13,8 +13,7 @@ import numpy as np
 
 from bentwing.base.errors import InputError
 from bentwing.base.regular_file import require_regular
-from bentwing.closing.georeference.control_points import PICKED, ControlPoint
-from bentwing.closing.georeference.standing import Standing
+from bentwing.closing.georeference.control_points import PICKED, ControlPoint, Standing
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

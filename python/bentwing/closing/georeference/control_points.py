@@ -16,7 +16,6 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from bentwing.closing.georeference.standing import Standing
     from bentwing.map.chunk import MapChunk
 
     Array = NDArray[np.float64]
@@ -30,6 +29,21 @@ _TRIMMED = 3.0
 
 
 Use: TypeAlias = Literal["control", "check"]
+
+
+@dataclass(frozen=True, slots=True)
+class Standing:
+    """When the carrier stood on a mark, and with what.
+
+    Attributes
+    ----------
+    first, last : s since the recording's start
+    foot : (3,) m, the point of the carrier that was on the mark, IMU frame
+    """
+
+    first: float
+    last: float
+    foot: Array
 
 
 @dataclass(frozen=True, slots=True)

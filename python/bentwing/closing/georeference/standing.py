@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,21 +21,6 @@ if TYPE_CHECKING:
 
 STILL = 0.05  # m; what moves farther does not stand
 _STEP = 0.02  # s
-
-
-@dataclass(frozen=True, slots=True)
-class Standing:
-    """When the carrier stood on a mark, and with what.
-
-    Attributes
-    ----------
-    first, last : s since the recording's start
-    foot : (3,) m, the point of the carrier that was on the mark, IMU frame
-    """
-
-    first: float
-    last: float
-    foot: NDArray[np.float64]
 
 
 def with_places(points: Sequence[ControlPoint], trajectory: Trajectory) -> tuple[ControlPoint, ...]:

@@ -65,11 +65,13 @@ class ProjectedSystem:
     epsg : its code
     name : of it
     wkt : well-known text, version 1 as LAS wants it
+    heights : what its heights are above, in words
     """
 
     epsg: int
     name: str
     wkt: str
+    heights: str = "above the ellipsoid"
 
     @classmethod
     def of_epsg(cls, epsg: int) -> ProjectedSystem:
@@ -78,7 +80,8 @@ class ProjectedSystem:
         Raises
         ------
         UsageError
-            If there is none of this code, or it is not projected or not in metres.
+            If there is none of this code, it is not projected or not in metres, or its heights need files
+            that are not there.
         """
         import pyproj
 
@@ -92,7 +95,12 @@ class ProjectedSystem:
                 f"EPSG:{epsg} ({crs.name}) is not projected in metres; give for example a UTM zone"
             )
             raise UsageError(msg)
-        return cls(epsg, crs.name, crs.to_wkt("WKT1_GDAL") or crs.to_wkt())
+        found = cls(epsg, crs.name, crs.to_wkt("WKT1_GDAL") or crs.to_wkt(), _heights(crs))
+        if (area := crs.area_of_use) is not None:  # before the hours of work that come first
+            width = (area.east - area.west) % 360.0  # some lie across the 180th meridian
+            middle = [area.west + width / 2, (area.south + area.north) / 2, 0.0]
+            found.from_geodetic(np.array([middle]))
+        return found
 
     @classmethod
     def utm(cls, longitude: float, latitude: float) -> ProjectedSystem:
@@ -146,19 +154,28 @@ def _geocentric(places: Array) -> Array:
 def _transformed(source: int, target: int, points: Array) -> Array:
     import pyproj
 
-    transformer = pyproj.Transformer.from_crs(
-        _solid(source), _solid(target), always_xy=True, only_best=True
-    )
     try:
+        # Without the files of a geoid, PROJ would take heights above the ellipsoid for those above the sea.
+        transformer = pyproj.Transformer.from_crs(
+            _solid(source), _solid(target), always_xy=True, only_best=True, allow_ballpark=False
+        )
         x, y, z = np.asarray(points, np.float64).T
         columns = transformer.transform(x, y, z, errcheck=True)
     except pyproj.exceptions.ProjError as error:
         msg = (
             f"coordinates cannot be taken from EPSG:{source} to EPSG:{target} ({error}); a system "
-            "with heights above the sea needs PROJ's grid files: choose one without, or install them"
+            "with heights above the sea needs PROJ's grid files: choose one without, or install them with "
+            "`pyproj sync`"
         )
         raise UsageError(msg) from None
     return np.stack(columns, axis=1)
+
+
+def _heights(crs: Any) -> str:  # noqa: ANN401 - pyproj is imported where it is needed
+    """Say what the heights of a system are above."""
+    if crs.is_compound:
+        return f"those of {crs.sub_crs_list[-1].name}"
+    return f"above the ellipsoid ({crs.ellipsoid.name})"
 
 
 def _solid(epsg: int) -> Any:  # noqa: ANN401 - pyproj is imported where it is needed

@@ -62,7 +62,10 @@ def add_title(
 
 def place_of(source: FinishedMap) -> str:
     """Say in which coordinates a map is."""
-    return "m in the run's own frame" if source.epsg is None else f"m in EPSG:{source.epsg}"
+    if source.epsg is not None:
+        return f"m in EPSG:{source.epsg}"
+    has_marks = bool((source.run.record.get("georeference") or {}).get("mode"))
+    return "m in the frame of the control points" if has_marks else "m in the run's own frame"
 
 
 def made_of(source: FinishedMap) -> str:

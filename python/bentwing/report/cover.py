@@ -37,11 +37,12 @@ def cover(drawn: Drawn) -> str:
         sections.tiles(record, drawn.trajectory, drawn.points, drawn.coverage, texts),
     ]
     if drawn.views is not None:
+        surveyed = marks_section(record.get("georeference"), texts)
+        kind = "surveyed" if surveyed else "plan"
         parts += [
-            _plan(record, drawn.views, texts),
+            f'<div class="{kind}">{_plan(record, drawn.views, texts)}{surveyed}</div>',
             _words(texts.coordinates, facts.coordinates(record, texts)),
             _words(texts.left_out, _left_out(record, texts)),
-            marks_section(record.get("georeference"), texts),
         ]
     return f'<section class="cover">{"".join(parts)}</section>'
 
@@ -53,16 +54,27 @@ def _made(record: Mapping[str, Any], texts: Texts) -> str:
 
 
 def _plan(record: Mapping[str, Any], views: MapViews, texts: Texts) -> str:
-    marks = (record.get("georeference") or {}).get("control_points")
+    marks = _marks(record)
     said = [
         texts.plan_note,
-        texts.plan_north if views.is_north_up else texts.plan_local,
+        _grid(record, views, texts),
         texts.plan_roof if views.ceiling is not None else "",
         texts.plan_marks if marks else "",
         spans_sentence(degenerate_spans(record.get("windows") or [])),
     ]
     note = " ".join(sentence for sentence in said if sentence)
     return sections.figure(views.plan, texts.plan, note)
+
+
+def _marks(record: Mapping[str, Any]) -> bool:
+    return bool((record.get("georeference") or {}).get("control_points"))
+
+
+def _grid(record: Mapping[str, Any], views: MapViews, texts: Texts) -> str:
+    """Say whose coordinates the grid of the plan has."""
+    if views.is_north_up:
+        return texts.plan_north
+    return texts.plan_site if (record.get("georeference") or {}).get("mode") else texts.plan_local
 
 
 def _left_out(record: Mapping[str, Any], texts: Texts) -> str:

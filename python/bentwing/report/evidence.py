@@ -34,7 +34,7 @@ def map_section(drawn: Drawn) -> str:
             drawn.trajectory,
             record.get("windows") or [],
             ceiling=views.ceiling,
-            origin=drawn.frame.origin,
+            frame=drawn.frame,
         ),
         figure(views.oblique, texts.oblique, texts.oblique_note, wide=True),
         figure(views.plan_time, texts.by_time, texts.by_time_note, wide=True),

@@ -56,10 +56,15 @@ def subject(record: Mapping[str, Any]) -> str:
 
 
 def _head(record: Mapping[str, Any]) -> str:
+    """Name the sensor head, or those of all runs."""
     payload = (record.get("settings") or {}).get("payload") or {}
-    kind = (payload.get("lidar") or {}).get("kind") or ""
-    name = payload.get("name") or ""
-    return f"{name} ({kind})" if name and kind else name or kind
+    own = {"name": payload.get("name"), "kind": (payload.get("lidar") or {}).get("kind")}
+    heads = [run["head"] for run in record.get("runs") or [] if "head" in run] or [own]
+    named = dict.fromkeys(
+        f"{name} ({kind})" if name and kind else name or kind
+        for name, kind in ((head["name"] or "", head["kind"] or "") for head in heads)
+    )
+    return ", ".join(named)
 
 
 def _spans(
@@ -107,7 +112,9 @@ def left_out(record: Mapping[str, Any], texts: Texts) -> list[str]:
     if fixes.get("rejected"):
         said.append(texts.left_fixes.format(n=fixes["rejected"], of=fixes.get("fixes", 0)))
     marks = (record.get("georeference") or {}).get("control_points") or []
-    unused = [str(row["id"]) for row in marks if row["residual"] is None]
+    unused = [
+        str(row["id"]) for row in marks if row["residual"] is None and row.get("picked_off") is None
+    ]
     if unused:
         said.append(texts.left_marks.format(names=", ".join(unused)))
     return said

@@ -55,10 +55,10 @@ def _table(rows: Sequence[Mapping[str, Any]], texts: Texts) -> str:
         (
             str(row["id"]),
             texts.uses.get(str(row["use"]), str(row["use"])),
-            _across(row["normal"], texts),
+            _across(row, texts),
             _millimetres(row["before"]),
             _millimetres(row["residual"]),
-            *([_millimetres(row.get("picked_off"))] if is_picked else []),
+            *([_millimetres(row.get("picked_off")).lstrip("+")] if is_picked else []),
         )
         for row in rows
     ]
@@ -68,9 +68,12 @@ def _table(rows: Sequence[Mapping[str, Any]], texts: Texts) -> str:
     )
 
 
-def _across(normal: Sequence[float] | None, texts: Texts) -> str:
+def _across(row: Mapping[str, Any], texts: Texts) -> str:
+    if row.get("contradicts"):
+        return texts.contradicts
+    normal = row["normal"]
     if normal is None:
-        return texts.not_used
+        return texts.not_used if row.get("picked_off") is None else texts.only_seen
     upward = abs(normal[2])
     if upward > _LEVEL:
         return texts.heights

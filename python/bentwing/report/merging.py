@@ -33,7 +33,11 @@ def merging_section(merging: Mapping[str, Any] | None) -> str:
 def _groups(merging: Mapping[str, Any]) -> str:
     """Tell what belongs together."""
     rows = [
-        (one["folder"], ", ".join(one["runs"]), str(one["n_links"]))
+        (
+            "this one" if one["folder"] == "." else one["folder"],
+            ", ".join(one["runs"]),
+            str(one["n_links"]),
+        )
         for one in merging.get("maps") or []
     ]
     if rows:
@@ -63,7 +67,9 @@ def _table(candidates: Sequence[Mapping[str, Any]]) -> str:
 def _place(candidate: Mapping[str, Any], side: str) -> str:
     span = candidate[f"span_{side}"]
     when = f", {span[0]:.0f}{DASH}{span[1]:.0f} s" if span else ""
-    return f"{candidate[side]} · {candidate[f'segment_{side}']}{when}"
+    segment = candidate[f"segment_{side}"]
+    part = f" · part {segment + 1}" if segment else ""
+    return f"{candidate[side]}{part}{when}"
 
 
 def _share(value: float | None) -> str:

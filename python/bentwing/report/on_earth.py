@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bentwing.report.sections import shares_table, table
+from bentwing.report.sections import MINUS, shares_table, table
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from bentwing.report.sections import Row
 _TOLD = {
@@ -24,7 +24,7 @@ def on_earth_section(found: Mapping[str, Any] | None) -> str:
     if not found:
         return ""
     fixes = found.get("fixes") or {}
-    rows = [*_place(found), *_fixes(fixes)]
+    rows = [*_place(found), *_fixes(fixes), *_antennas(found.get("antennas") or [])]
     if "bent_by" in found:
         rows.append(
             ("way bent towards fixes and marks by at most", f"{1e3 * found['bent_by']:.0f} mm")
@@ -32,25 +32,43 @@ def on_earth_section(found: Mapping[str, Any] | None) -> str:
     shares = ""
     if fixes.get("runs"):
         shares = f"<h3>GNSS fixes of the runs</h3>{shares_table(fixes['runs'])}"
-    return f"<section><h2>Place on the Earth</h2>{table(('what', 'value'), rows)}{shares}</section>"
+    name = "Place on the Earth" if "epsg" in found else "Place in the frame of the control points"
+    return f"<section><h2>{name}</h2>{table(('what', 'value'), rows)}{shares}</section>"
 
 
 def _place(found: Mapping[str, Any]) -> list[Row]:
     rows: list[Row] = []
     if "heading" in found:
-        turn = f"{np.degrees(found['heading']):.3f}° from east to north"
+        turn = f"{np.degrees(found['heading']):.3f}° from east to north".replace("-", MINUS)
         if "std" in found:
             turn += f", standard deviation {np.degrees(found['std']['heading']):.3f}°"
         rows.append(("direction of the x axis that the map had", turn))
     if "std" in found:
         east, north, up = (1e3 * s for s in found["std"]["translation"])
         said = f"{east:.1f} mm east, {north:.1f} mm north, {up:.1f} mm up"
+        rows.append(("standard deviation of the place", said))
+    if "point_scale" in found:
         rows += [
-            ("standard deviation of the place", said),
             ("meridian convergence", f"{found['convergence_deg']:.4f}°"),
             ("point scale of the projection", f"{found['point_scale']:.6f}"),
         ]
     return rows
+
+
+def _antennas(antennas: Sequence[Mapping[str, Any]]) -> list[Row]:
+    """Say where the fixes have those antennas that the payload leaves to them."""
+    return [
+        (
+            f"antenna{of} in the IMU frame, by the fixes",
+            ", ".join(
+                f"{name} {metres:.3f} ± {std:.3f} m".replace("-", MINUS)
+                for name, metres, std in zip("xyz", one["lever_arm"], one["std"], strict=True)
+            ),
+        )
+        for one in antennas
+        if one["used"]
+        for of in [f" of {one['run']}" if one["run"] else ""]
+    ]
 
 
 def _fixes(fixes: Mapping[str, Any]) -> list[Row]:

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from bentwing.report.picture import View
     from bentwing.report.way import Way
 
-_LEFT, _FOOT, _TOP, _SIZE = 34, 96, 30, 18  # pixels: margins, and the height of letters
+_LEFT, _FOOT, _TOP, _SIZE = 38, 100, 30, 22  # pixels: margins, and the height of letters
 _LINES = 6  # of the grid, about, along the longer side
 _MARK = 8  # pixels, half of a mark's size
 
@@ -155,11 +155,11 @@ def _marked(marks: Sequence[Mark], view: View) -> list[str]:
     taken = [(x - _MARK, y - _MARK, x + _MARK, y + _MARK) for x, y in places]
     drawn = [_symbol(x, y, mark.is_check) for mark, (x, y) in zip(marks, places, strict=True)]
     for mark, (x, y) in zip(marks, places, strict=True):
-        long = 0.62 * _SIZE * len(mark.name)
+        long = 0.66 * _SIZE * len(mark.name)
         corners = [(x + _MARK + 4, y + 6), (x - _MARK - 4 - long, y + 6),
                    (x - long / 2, y - _MARK - 5), (x - long / 2, y + _MARK + _SIZE)]  # fmt: skip
         for left, base in corners:
-            box = (left, base - _SIZE + 3, left + long, base + 2)
+            box = (left - 2, base - _SIZE, left + long + 2, base + 5)
             if not any(_overlap(box, other) for other in taken):
                 taken.append(box)
                 drawn.append(

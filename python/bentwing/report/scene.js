@@ -95,7 +95,7 @@ const startScene = (figure) => {
   const colours = texture(gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE, gl.COLOR_ATTACHMENT0);
   const depths = texture(gl.DEPTH_COMPONENT24, gl.DEPTH_COMPONENT, gl.UNSIGNED_INT, gl.DEPTH_ATTACHMENT);
 
-  const places = new Uint16Array(bytes(data.points).buffer);
+  const places = new Uint16Array(bytes(data.points).buffer), ages = bytes(data.times);
   const size = data.high.map((x, i) => x - data.low[i]);
   const oblique = { turn: -0.5, lift: 0.6 };
   const view = { ...oblique, at: [...data.centre], scale: 1, byTime: false, low: [...data.low], high: [...data.high] };
@@ -194,7 +194,7 @@ const startScene = (figure) => {
   };
 
   // A distance between two points of the map that are picked.
-  const picked = [];
+  const picked = [], taken = []; // the ends of the distance, and all that was clicked
   const isShown = (p) => p.every((x, i) => x >= view.low[i] && x <= view.high[i]);
   const pick = (x, y) => { // the nearest to the viewer of those within some pixels, else none
     const near = 6;
@@ -202,9 +202,34 @@ const startScene = (figure) => {
     for (let k = 0; k < places.length; k += 3) {
       const p = [0, 1, 2].map((i) => data.origin[i] + data.step * places[k + i]);
       const [a, b, toward] = onScreen(p);
-      if (toward > nearest && Math.hypot(a - x, b - y) < near && isShown(p)) [best, nearest] = [p, toward];
+      if (toward > nearest && Math.hypot(a - x, b - y) < near && isShown(p)) [best, nearest] = [Object.assign(p, { at: k / 3 }), toward];
     }
     return best;
+  };
+  const take = (x, y) => {
+    const found = view.isMeasuring && pick(x, y);
+    if (!found) return;
+    if (picked.length === 2) picked.length = 0;
+    picked.push(found);
+    taken.push(found);
+    redraw();
+  };
+  const inMap = (p) => { // in the frame of the trajectory
+    const { R, place, middle } = data.to_map, gap = p.map((x, i) => x - place[i]);
+    return R.map((row, i) => (dot(row, gap) + middle[i]).toFixed(4));
+  };
+  const seconds = (p) => (data.seconds[0] + (data.seconds[1] - data.seconds[0]) * ages[p.at] / 255).toFixed(1);
+  const contents = {
+    points: () => ["points.csv", "id,x,y,z,map_x,map_y,map_z\n" + taken.map((p, i) => `P${i + 1},,,,${inMap(p)}\n`).join("")],
+    loop: () => ["loops.yaml", `loops:\n- times: [${taken.slice(-2).map(seconds).join(", ")}]\n`],
+  };
+  const save = (what) => {
+    if (taken.length < (what === "loop" ? 2 : 1)) { part("distance").textContent = data.words.none; return; }
+    const [name, text] = contents[what](), link = document.createElement("a");
+    link.href = URL.createObjectURL(new Blob([text], { type: "text/plain" }));
+    link.download = name;
+    link.click();
+    URL.revokeObjectURL(link.href);
   };
   const drawMeasure = () => {
     const overlay = part("measured"), at = picked.map(onScreen);
@@ -266,12 +291,8 @@ const startScene = (figure) => {
   for (const kind of ["pointerup", "pointercancel"]) canvas.addEventListener(kind, (e) => fingers.delete(e.pointerId));
   canvas.addEventListener("click", (e) => {
     setActive(true);
-    if (!view.isMeasuring || moved > 4) return;
-    const box = canvas.getBoundingClientRect(), found = pick(e.clientX - box.left, e.clientY - box.top);
-    if (!found) return;
-    if (picked.length === 2) picked.length = 0;
-    picked.push(found);
-    redraw();
+    const box = canvas.getBoundingClientRect();
+    if (moved <= 4) take(e.clientX - box.left, e.clientY - box.top);
   });
   canvas.addEventListener("wheel", (e) => {
     if (!figure.classList.contains("active") && !e.ctrlKey) return;
@@ -284,7 +305,8 @@ const startScene = (figure) => {
     if (steps[e.key]) (e.shiftKey ? shiftBy : turnBy)(...steps[e.key]);
     else if (e.key === "+" || e.key === "=") zoomBy(1.2);
     else if (e.key === "-") zoomBy(1 / 1.2);
-    else if (e.key === "Escape") { picked.length = 0; setActive(false); }
+    else if (e.key === "Enter") take(canvas.clientWidth / 2, canvas.clientHeight / 2);
+    else if (e.key === "Escape") { picked.length = taken.length = 0; setActive(false); }
     else return;
     e.preventDefault();
     redraw();
@@ -293,6 +315,7 @@ const startScene = (figure) => {
   const looks = { oblique, top: { turn: 0, lift: Math.PI / 2 }, front: { turn: 0, lift: 0 }, side: { turn: Math.PI / 2, lift: 0 } };
   const press = (button) => {
     const { value } = button;
+    if (contents[value]) { save(value); return; }
     if (looks[value]) { Object.assign(view, looks[value], { isMoved: false }); fit(); }
     else if (value === "measure") { view.isMeasuring = !view.isMeasuring; picked.length = 0; button.ariaPressed = view.isMeasuring; }
     else view.byTime = value === "time";

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bentwing.report.colours import HEIGHT, TIME
+from bentwing.report.frame import ShownFrame
 from bentwing.report.stretches import degenerate
 from bentwing.report.view.levels import FINEST, Level
 
@@ -30,6 +31,7 @@ _BUTTONS = {
     "Colour": {"height": "Height", "time": "Time"},
     "View": {"oblique": "Oblique", "top": "Top", "front": "Front", "side": "Side"},
     "Distance": {"measure": "Measure"},
+    "Clicked": {"points": "Save points", "loop": "Save loop"},
 }
 _SIDES = (("x from", "low", 0), ("x to", "high", 0), ("y from", "low", 1), ("y to", "high", 1),
           ("height from", "low", 2))  # fmt: skip
@@ -37,6 +39,7 @@ _WORDS = {
     "first": "Click a point of the map.",
     "second": "Click another point.",
     "distance": "{whole} m apart; {level} m level, {up} m up.",
+    "none": "Press Measure and click points of the map first.",
 }
 
 
@@ -47,7 +50,7 @@ def scene(
     windows: Sequence[Mapping[str, Any]] = (),
     *,
     ceiling: float | None = None,
-    origin: NDArray[np.float64] | None = None,
+    frame: ShownFrame | None = None,
 ) -> str:
     """Return the view as HTML with its data and its script.
 
@@ -58,7 +61,7 @@ def scene(
     trajectory : of the IMU; may be empty
     windows : records of the estimate; where one is degenerate the path is red
     ceiling : m, at which the view is cut at first; default: nowhere
-    origin : (3,) m, to add to coordinates for those that are written; default: 0
+    frame : of points and trajectory; default: the map's own
     """
     level = Level(FINEST, N_POINTS)
     level.add(points, times)
@@ -67,14 +70,22 @@ def scene(
     data["spacing"] = _OVERLAP * max(even.edge, data["spacing"] / _OVERLAP / 2)
     if ceiling is not None:
         data["cut"] = min(max(ceiling, data["low"][2]), data["high"][2])
-    data["shown"] = [0.0, 0.0, 0.0] if origin is None else origin.tolist()
+    shown = frame or ShownFrame()
+    data["shown"] = shown.origin.tolist()
+    # from what is shown to the frame of the trajectory, in which control points are seen
+    data["to_map"] = {
+        "R": shown.R.T.tolist(),
+        "place": shown.place.tolist(),
+        "middle": shown.middle.tolist(),
+    }
     script = files("bentwing.report").joinpath("scene.js").read_text(encoding="utf-8")
     return (
         f'<figure id="scene" class="wide"><div class="stage">{_STAGE}</div>{_choices()}'
         f'<script type="application/json">{json.dumps(data)}</script>'
         "<figcaption><b>In three dimensions</b> Without perspective, so that the scale bar is true everywhere. Drag to "
         "turn, right or shift drag to shift, two fingers to shift and zoom. The wheel zooms after a click, or with Ctrl. "
-        "Keys: arrows turn, shift and arrows shift, + and \N{MINUS SIGN} zoom. The way of the sensor is dark, and red where a "
+        "Keys: arrows turn, shift and arrows shift, + and \N{MINUS SIGN} zoom, Enter picks the point in the middle. What was "
+        "clicked is saved as a file of control points, or the last two as a loop. The way of the sensor is dark, and red where a "
         'direction was not seen. <span class="without">This browser shows no WebGL; the pictures below say the '
         f"same.</span></figcaption></figure><script>{script}</script>"
     )

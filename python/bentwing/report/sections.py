@@ -77,7 +77,13 @@ def capital(sentence: str) -> str:
 def expected(record: Mapping[str, Any], texts: Texts) -> str:
     """Say how accurate the result is expected to be."""
     found = record.get("expected_accuracy")
-    said = ExpectedAccuracy(**found).sentence() if found else texts.accuracy_none
+    checked = ((record.get("georeference") or {}).get("residuals") or {}).get("check")
+    if found:
+        said = ExpectedAccuracy(**found).sentence()
+    elif checked:
+        said = texts.accuracy_checked.format(rms=1e3 * checked["rms"], n=checked["n"])
+    else:
+        said = texts.accuracy_none
     return _BEFORE_UNIT.sub("\N{NO-BREAK SPACE}", said)
 
 
@@ -134,7 +140,7 @@ def refinement_sentence(found: Mapping[str, Any] | None, texts: Texts) -> str:
     if not found.get("moved"):
         return f"<p>{escape(texts.nothing_refined)}</p>"
     move, before, after = (1000 * found[name] for name in ("move", "sigma_before", "sigma"))
-    said = texts.refined.format(share=found["moved"], move=move, before=before, after=after)
+    said = texts.refined.format(share=100 * found["moved"], move=move, before=before, after=after)
     return f"<p>{escape(said)}</p>"
 
 
@@ -198,7 +204,11 @@ def shares_table(shares: Sequence[Mapping[str, Any]]) -> str:
     """Make the table of runs whose GNSS fixes place a merged map."""
 
     def metres(offset: Sequence[float] | None) -> str:
-        return DASH if offset is None else ", ".join(f"{value:+.3f}" for value in offset)
+        return (
+            DASH
+            if offset is None
+            else ", ".join(f"{value:+.3f}".replace("-", MINUS) for value in offset)
+        )
 
     cells = [
         (s["name"], f"{s['used']:,}", f"{s['rejected']:,}", metres(s["offset"])) for s in shares

@@ -42,6 +42,7 @@ class Texts:
     finished: str = "Map finished"
     worth_knowing: str = "Worth knowing:"
     accuracy_none: str = "No accuracy is stated: this kind of result has no error estimate of its own; see the checks below."
+    accuracy_checked: str = "Accuracy: {n} check points are off by {rms:.1f} mm root mean square; they are listed below."
     area: str = "area seen from above"
     volume: str = "volume between lowest and highest surface"
     length: str = "length of the way"
@@ -52,6 +53,7 @@ class Texts:
     plan_note: str = "Height by colour; the line is the way of the sensor, the circle its start."
     plan_north: str = "Grid north is up; the grid has the coordinates of the system below."
     plan_local: str = "The grid is that of the map's own frame, in metres."
+    plan_site: str = "The grid is that of the control points, in metres; its y axis points up."
     plan_roof: str = (
         "What is above the sensor is left out, so that the roof does not hide the floor."
     )
@@ -90,12 +92,14 @@ class Texts:
     sideways: str = "sideways"
     mixed: str = "sloped"
     not_used: str = "not used: no flat surface"
+    only_seen: str = "where it was seen"
+    contradicts: str = "not used: contradicts the others"
     map: str = "Map"
     no_points: str = "No points were mapped."
     no_map: str = "No map was asked for."
     nothing_refined: str = "No point was moved: there is no surface that enough passes have seen."
     refined: str = (
-        "{share:.0%} of the points were moved along their beams to the surface that they measured "
+        "{share:.0f} % of the points were moved along their beams to the surface that they measured "
         "together, by {move:.1f} mm in the median; one standard deviation along the beam was "
         "{before:.1f} mm and is {after:.1f} mm. The pictures and the accuracy below show the points "
         "as measured."

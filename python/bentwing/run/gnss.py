@@ -48,5 +48,8 @@ def receivers_of(
 
     fixes = fixes_of(part.recording, wanted, part.start, part.duration)
     gnss = part.payload.gnss
-    lever_arm = (0.0, 0.0, 0.0) if gnss is None else gnss.lever_arm
-    return None if fixes is None else Receivers.one(fixes, lever_arm, name)
+    if fixes is None:
+        return None
+    if gnss is None:
+        return Receivers.one(fixes, (0.0, 0.0, 0.0), name)
+    return Receivers.one(fixes, gnss.lever_arm, name, gnss.lever_arm_std)

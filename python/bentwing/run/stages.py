@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from bentwing.base.errors import NotEnoughDataError
 from bentwing.base.progress import Progress
-from bentwing.evaluate.verdict import judge_closing, judge_revisits
+from bentwing.evaluate.verdict import judge_closing, judge_marks, judge_revisits
 from bentwing.run.gnss import NO_LEVER, receivers_of
 
 if TYPE_CHECKING:
@@ -145,7 +145,10 @@ def place_on_earth(job: Job, found: Found) -> Found:
         )
     lacking = (NO_LEVER,) if part.payload.gnss is None and settings.fixes is not None else ()
     warnings = (*found.stage_warnings, *lacking, *placed.warnings)
-    return replace(found, estimate=estimate, placed=placed, stage_warnings=warnings)
+    evidence = (*found.evidence, *judge_marks(placed.record))
+    return replace(
+        found, estimate=estimate, placed=placed, stage_warnings=warnings, evidence=evidence
+    )
 
 
 def make_map(job: Job, found: Found) -> Found:

@@ -55,3 +55,18 @@ def test_easting_and_northing_come_first_and_height_stays():
 def test_what_is_no_projected_system_in_metres_is_refused(epsg, what):
     with pytest.raises(UsageError, match=what):
         ProjectedSystem.of_epsg(epsg)
+
+
+def test_heights_above_the_sea_without_a_geoid_are_refused_before_any_work():
+    """PROJ knows no geoid of DHHN92, and would keep the heights as they are."""
+    with pytest.raises(UsageError, match="grid files"):
+        ProjectedSystem.of_epsg(5555)
+
+
+def test_a_system_says_what_its_heights_are_above():
+    assert ProjectedSystem.of_epsg(25832).heights == "above the ellipsoid (GRS 1980)"
+
+
+@pytest.mark.parametrize("epsg", [2193, 28992, 31467, 2154, 6677, 7855, 26910])
+def test_systems_of_other_datums_and_across_the_180th_meridian_are_taken(epsg):
+    assert ProjectedSystem.of_epsg(epsg).epsg == epsg

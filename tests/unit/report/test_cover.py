@@ -141,9 +141,9 @@ def test_the_grid_has_round_coordinates_and_north_only_on_the_earth():
 def test_names_of_marks_do_not_lie_on_each_other():
     marks = [Mark(f"M{i}", (0.1 * i, 0.0), is_check=i > 3) for i in range(8)]
     drawn = plan(ShownFrame(), marks)
-    named = re.findall(r'<text x="([\d.]+)" y="([\d.]+)" font-size="18" fill="#000"', drawn)
+    named = re.findall(r'<text x="([\d.]+)" y="([\d.]+)" font-size="22" fill="#000"', drawn)
     places = np.array(named, float)
     apart = np.abs(places[:, None] - places[None])
-    clear = (apart[..., 0] > 20) | (apart[..., 1] > 14) | np.eye(len(places), dtype=bool)
+    clear = (apart[..., 0] > 24) | (apart[..., 1] > 17) | np.eye(len(places), dtype=bool)
     assert len(places) >= 2
     assert clear.all()

@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
 """The report in a real browser: nothing fails to load, nothing overflows, the view turns."""
 
+import csv
+import re
 import shutil
 
 import numpy as np
 import pytest
 
 from bentwing.base.trajectory import Trajectory
+from bentwing.closing.georeference.control_point_file import read_control_points
 from bentwing.report.page import write_report
 
 sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
@@ -197,3 +200,33 @@ def test_the_map_fits_and_distances_are_those_of_the_scale_bar(opened):
     told = opened.locator("#scene [data-part=distance]").inner_text()
     assert float(told.split()[0]) == pytest.approx(6.0, abs=14 / scale)
     assert opened.locator("#scene [data-part=measured] circle").count() == 2
+
+
+def saved(page, tmp_path, what):
+    with page.expect_download() as download:
+        page.locator(f"#scene button[value={what}]").click()
+    path = tmp_path / download.value.suggested_filename
+    download.value.save_as(path)
+    return path
+
+
+def test_clicked_points_become_control_points_and_a_loop(opened, tmp_path):
+    canvas = opened.locator("#scene canvas")
+    opened.locator("#scene button[value=points]").click()
+    assert "Measure" in opened.locator("#scene [data-part=distance]").inner_text()
+    drawn(opened, opened.locator("#scene button[value=top]").click)
+    drawn(opened, opened.locator("#scene button[value=measure]").click)
+    drawn(opened, canvas.click)
+    drawn(opened, lambda: canvas.press("Enter"))  # the middle again, by the keyboard
+    path = saved(opened, tmp_path, "points")
+    rows = list(csv.DictReader(path.read_text().splitlines()))
+    places = np.array([[row[f"map_{axis}"] for axis in "xyz"] for row in rows], float)
+    # The room is 20 by 10 m in the frame of the trajectory, whatever frame is shown.
+    assert np.allclose(places[:, :2], [[10.0, 5.0]] * 2, atol=0.5)
+    filled = path.read_text().replace(",,,,", ",1,2,3,")
+    path.write_text(filled)
+    listed = read_control_points(path).points
+    assert [point.name for point in listed] == ["P1", "P2"]
+    assert np.allclose(listed[0].picked, places[0])
+    loops = saved(opened, tmp_path, "loop").read_text()
+    assert re.fullmatch(r"loops:\n- times: \[[\d.]+, [\d.]+\]\n", loops)

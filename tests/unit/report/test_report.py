@@ -252,5 +252,5 @@ def test_the_place_on_the_earth_has_its_name_and_the_share_of_each_run():
     for part in ("212 used, 7 left out", "12 mm horizontally, 20 mm vertically", "1 with no fix"):
         assert part in shown, part
     assert "morning" in shown
-    assert "+0.001, +0.000, -0.006" in shown
+    assert "+0.001, +0.000, \N{MINUS SIGN}0.006" in shown
     assert "{" not in shown

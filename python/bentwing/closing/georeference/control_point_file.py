@@ -13,11 +13,15 @@ import numpy as np
 
 from bentwing.base.errors import InputError
 from bentwing.base.regular_file import require_regular
-from bentwing.closing.georeference.control_points import ControlPoint
+from bentwing.closing.georeference.control_points import PICKED, ControlPoint, Standing
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from bentwing.closing.georeference.control_points import Use
 
 RADIUS = 0.3
 """m, where a file names none: what is flat around a mark on a floor or a wall."""
@@ -30,12 +34,13 @@ _NAMES = {
     "latitude": ("latitude", "lat"),
     "radius": ("radius", "r"),
     "use": ("use", "type"),
-    "map_x": ("map_x",), "map_y": ("map_y",), "map_z": ("map_z",),
+    **{name: (name,) for name in ("map_x", "map_y", "map_z", "sigma", "time", "until", "foot_x", "foot_y", "foot_z")},
 }  # fmt: skip
 _MOST_BYTES = 2**24  # a site has some hundred marks
 _DELIMITERS = ";\t,"
 _PLACES = {"degrees": ("longitude", "latitude", "z"), "metres": ("x", "y", "z")}
 _PICKED = ("map_x", "map_y", "map_z")
+_FOOT = ("foot_x", "foot_y", "foot_z")
 _USES = ("control", "check")
 _UNIT = re.compile(r"\s*[\[(].*[\])]\s*$")
 
@@ -88,7 +93,8 @@ def _control_points(path: Path, reader: csv.DictReader[str], delimiter: str) -> 
         found = ", ".join(reader.fieldnames or []) or "nothing"
         msg = (
             f"{path}: has no column {', '.join(missing)}; its first line is {found!r}, and must name "
-            "id, x, y, z (or longitude, latitude, z), and may name radius, use, map_x, map_y, map_z"
+            "id, x, y, z (or longitude, latitude, z), and may name radius, use, map_x, map_y, map_z, sigma, "
+            "time, until, foot_x, foot_y, foot_z"
         )
         raise InputError(msg)
     points = tuple(_control_point(path, row, columns, places, delimiter) for row in reader)
@@ -119,34 +125,65 @@ def _columns(header: Sequence[str]) -> dict[str, str]:
     return found
 
 
+@dataclass(frozen=True, slots=True)
+class _Row:
+    """A line of the file; what it leaves empty is None, and what is no number NaN."""
+
+    texts: Mapping[str, str]
+    columns: Mapping[str, str]
+    has_commas: bool
+
+    def text(self, name: str) -> str:
+        return ((self.texts[self.columns[name]] if name in self.columns else "") or "").strip()
+
+    def value(self, name: str) -> float | None:
+        text = self.text(name)
+        try:
+            return float(text.replace(",", ".") if self.has_commas else text) if text else None
+        except ValueError:
+            return np.nan
+
+    def point(self, names: Sequence[str]) -> NDArray[np.float64] | None:
+        """Three values; None where one is left empty."""
+        values = [self.value(name) for name in names]
+        return None if None in values else np.array(values, np.float64)
+
+
 def _control_point(
     path: Path,
-    row: Mapping[str, str],
+    texts: Mapping[str, str],
     columns: Mapping[str, str],
     places: Sequence[str],
     delimiter: str,
 ) -> ControlPoint:
-    def value(name: str) -> float:
-        text = row[columns[name]]
-        try:
-            return float(text if delimiter == "," else text.replace(",", "."))
-        except (AttributeError, TypeError, ValueError):
-            return np.nan
-
-    name = str(row[columns["id"]]).strip()
-    use = ((row[columns["use"]] if "use" in columns else "") or "control").strip().lower()
-    position = np.array([value(place) for place in places])
-    radius = value("radius") if "radius" in columns else RADIUS
-    is_picked = all(key in columns and (row[columns[key]] or "").strip() for key in _PICKED)
-    picked = np.array([value(key) for key in _PICKED]) if is_picked else None
-    is_known = np.isfinite(position).all() and (picked is None or np.isfinite(picked).all())
-    if not (is_known and 0 < radius < 100) or use not in _USES:
+    row = _Row(texts, columns, delimiter != ",")
+    name, use = row.text("id"), (row.text("use") or "control").lower()
+    position, picked, standing = row.point(places), row.point(_PICKED), _standing(row)
+    radius, sigma = (
+        default if (given := row.value(of)) is None else given
+        for of, default in (("radius", RADIUS), ("sigma", PICKED))
+    )
+    stood = None if standing is None else [standing.first, standing.last, *standing.foot]
+    known = [one for one in ([radius, sigma], position, picked, stood) if one is not None]
+    is_fit = np.isfinite(np.concatenate(known)).all() and 0 < radius < 100 and 0 < sigma < 100
+    is_twice = picked is not None and standing is not None
+    if position is None or not is_fit or is_twice or use not in _USES:
         msg = (
-            f"{path}: point {name!r} is {dict(row)}; expected numbers for {', '.join(places)}, a radius "
-            "in metres, and as use control or check"
+            f"{path}: point {name!r} is {dict(texts)}; expected numbers for {', '.join(places)}, radius and "
+            "sigma in metres, map_x, map_y, map_z or the time at which the carrier stood on it, and as use "
+            "control or check"
         )
         raise InputError(msg)
-    return ControlPoint(name, position, radius, "check" if use == "check" else "control", picked)
+    kind: Use = "check" if use == "check" else "control"
+    return ControlPoint(name, position, radius, kind, picked, sigma, standing)
+
+
+def _standing(row: _Row) -> Standing | None:
+    time = row.value("time")
+    if time is None:
+        return None
+    until, foot = row.value("until"), row.point(_FOOT)
+    return Standing(time, time if until is None else until, np.zeros(3) if foot is None else foot)
 
 
 def _require_names(path: Path, names: Sequence[str]) -> None:

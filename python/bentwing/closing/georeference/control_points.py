@@ -9,7 +9,7 @@ along the normal. A mark on a floor so tells the height, one on a wall the way a
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
 
@@ -24,7 +24,26 @@ MIN_POINTS = 20
 MAX_POINTS = 40_000  # of one mark in memory
 MIN_SPREAD = 0.1  # of the radius, across: points of one scan line have no normal
 MIN_SIGMA = 0.003  # m; marks are not surveyed better
+PICKED = 0.02  # m, to which a mark is found in a cloud
 _TRIMMED = 3.0
+
+
+Use: TypeAlias = Literal["control", "check"]
+
+
+@dataclass(frozen=True, slots=True)
+class Standing:
+    """When the carrier stood on a mark, and with what.
+
+    Attributes
+    ----------
+    first, last : s since the recording's start
+    foot : (3,) m, the point of the carrier that was on the mark, IMU frame
+    """
+
+    first: float
+    last: float
+    foot: Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,13 +58,17 @@ class ControlPoint:
     radius : m, of the surface around it that is flat
     use : `control` points constrain the map, `check` points only tell how good it is
     picked : (3,) m, where the mark was seen in the map; None where nobody has said
+    sigma : m, standard deviation of that place
+    standing : when the carrier stood on the mark, which says where it is in the map
     """
 
     name: str
     position: Array
     radius: float
-    use: Literal["control", "check"]
+    use: Use
     picked: Array | None = None
+    sigma: float = PICKED
+    standing: Standing | None = None
 
 
 @dataclass(frozen=True, slots=True)

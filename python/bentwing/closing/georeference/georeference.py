@@ -3,13 +3,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bentwing.base.errors import NotEnoughDataError
 from bentwing.base.geodesy import ProjectedSystem
+from bentwing.closing.georeference.antenna import find_antennas
 from bentwing.closing.georeference.control_point_file import read_control_points
 from bentwing.closing.georeference.marks import Marks, summary
 from bentwing.closing.georeference.placement import (
@@ -19,6 +20,8 @@ from bentwing.closing.georeference.placement import (
 from bentwing.closing.georeference.projection import MapProjection
 from bentwing.closing.georeference.shares import shares_of
 from bentwing.closing.georeference.site import Site
+from bentwing.closing.georeference.snooping import contradictions
+from bentwing.closing.georeference.standing import with_places
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -26,8 +29,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bentwing.base.trajectory import Trajectory
+    from bentwing.closing.georeference.antenna import Antenna
     from bentwing.closing.georeference.receivers import Receivers
     from bentwing.closing.georeference.settings import GeoreferenceSettings
+    from bentwing.closing.georeference.snooping import Contradiction, Fit
     from bentwing.map.chunk import MapChunk
 
     Array = NDArray[np.float64]
@@ -35,6 +40,7 @@ if TYPE_CHECKING:
 DOUBTFUL_HEADING_STD = np.radians(1.0)  # half a metre at the end of a lidar's reach
 _MEASURED = 5  # times that surfaces are found anew
 _BENT = 2
+_GEOID = 8.0  # m; where the geoid is nearer to the ellipsoid, nobody can tell the two by a flight
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,14 +102,18 @@ def georeference(
     UsageError, InputError
         If the projected system or the file of the control points cannot be used.
     """
-    listed = read_control_points(settings.control_points) if settings.control_points else None
+    listed = None
+    if settings.control_points is not None:
+        listed = read_control_points(settings.control_points)
+        listed = replace(listed, points=with_places(listed.points, trajectory))
     if settings.mode == "off" or (receivers is None and listed is None):
         return None
     system = None if settings.epsg is None else ProjectedSystem.of_epsg(settings.epsg)
     site = Site.of(trajectory, receivers, segments, system, listed)
-    placement, used = site.first_placement()
+    site, placement, used, antennas = _with_antennas(site)
     marks: Marks | None = None
     before: list[float | None] = []
+    found: list[Contradiction] = []
     slack = site.slack()
     if listed is not None and chunks is not None:
         targets = site.targets_of(listed)
@@ -117,10 +127,11 @@ def georeference(
             )
             raise NotEnoughDataError(msg)
         before = marks.residuals(placement)
-        for i in range(_MEASURED):
-            surfaces, _ = marks.surfaces()
-            placement, used = place(site.positions, surfaces, placement)
-            marks.measure(placement, slack if i == 0 else min(slack, 0.1))
+        placement, used = _measured(site, marks, placement, slack)
+        found = contradictions(marks, _fit_of(site, marks, placement), site.n_known)
+        marks.false = {one.number for one in found if one.is_certain and one.number in marks.used}
+        if marks.false:
+            placement, used = _measured(site, marks, placement, slack)
     bent = trajectory
     if settings.mode == "constraints":
         for _ in range(_BENT):
@@ -133,9 +144,42 @@ def georeference(
         reach=reach,
         marks=marks,
         before=before,
+        contradicting=found,
+        antennas=antennas,
         mode=settings.mode,
         columns={} if listed is None else listed.columns,
     )
+
+
+def _with_antennas(site: Site) -> tuple[Site, Placement, NDArray[np.bool_], list[Antenna]]:
+    """Place the map by the fixes, with the antennas where the fixes have them if the payload lets them."""
+    placement, used = site.first_placement()
+    antennas = find_antennas(site, placement)
+    for antenna in antennas:
+        if antenna.is_free:
+            site = site.with_antenna(antenna.run, antenna.moved)
+    if any(antenna.is_free for antenna in antennas):
+        placement, used = site.first_placement()
+    return site, placement, used, antennas
+
+
+def _measured(
+    site: Site, marks: Marks, placement: Placement, slack: float
+) -> tuple[Placement, NDArray[np.bool_]]:
+    """Place the map, and find the surfaces around the marks anew where they are then."""
+    used = np.empty(0, np.bool_)
+    for i in range(_MEASURED):
+        surfaces, _ = marks.surfaces(marks.used)
+        placement, used = place(site.positions_of(marks, marks.used), surfaces, placement)
+        marks.measure(placement, slack if i == 0 else min(slack, 0.1))
+    return placement, used
+
+
+def _fit_of(site: Site, marks: Marks, start: Placement) -> Fit:
+    def fit(numbers: Sequence[int]) -> Placement:
+        return place(site.positions_of(marks, numbers), marks.surfaces(numbers)[0], start)[0]
+
+    return fit
 
 
 def _finished(
@@ -147,6 +191,8 @@ def _finished(
     reach: float,
     marks: Marks | None,
     before: Sequence[float | None],
+    contradicting: Sequence[Contradiction],
+    antennas: Sequence[Antenna],
     mode: str,
     columns: Mapping[str, str],
 ) -> Georeferenced:
@@ -156,21 +202,42 @@ def _finished(
     if site.receivers is not None:
         gaps = placement.to_level(site.antenna(trajectory)[0]) - site.positions.targets
         record["fixes"], said = _of_fixes(site.receivers, gaps, used)
+        record["antennas"] = [antenna.record() for antenna in antennas]
         warnings += said
+        warnings += [a.sentence() for a in antennas if a.is_elsewhere and not a.is_free]
     if placement.std[0] > DOUBTFUL_HEADING_STD:
-        warnings.append(
-            f"the heading of the map on the Earth is known to {np.degrees(placement.std[0]):.1f}° "
-            "only: fly a longer way, or give control points"
+        known = f"the heading of the map is known to {np.degrees(placement.std[0]):.1f}° only"
+        advice = (
+            "give marks farther apart"
+            if site.receivers is None
+            else "fly a longer way, or give control points"
         )
+        warnings.append(f"{known}: {advice}")
     if marks is not None:
         rows = marks.table(placement, before)
         record["control_points"], record["residuals"] = rows, summary(rows)
         record["control_point_columns"] = dict(columns)
-        warnings += marks.warnings(placement)
+        record["contradictions"] = [one.record(marks) for one in contradicting]
+        warnings += [*marks.warnings(), *_other_heights(site, marks)]
     if trajectory is not site.original:
         moved = np.linalg.norm(trajectory.positions - site.original.positions, axis=1)
         record["bent_by"] = float(moved.max())
     return Georeferenced(trajectory, projection, placement, record, warnings)
+
+
+def _other_heights(site: Site, marks: Marks) -> list[str]:
+    """Say that marks are above or below all fixes, as heights above the sea are."""
+    if not len(site.times):
+        return []
+    gap = float(np.median(marks.targets[:, 2]) - np.median(site.positions.targets[:, 2]))
+    if abs(gap) < _GEOID or any(marks.planes):
+        return []
+    where = "above" if gap > 0 else "below"
+    return [
+        f"the control points lie {abs(gap):.0f} m {where} the GNSS fixes, whose heights are above the "
+        "ellipsoid; if those of the control points are above the sea, choose a system with such heights by "
+        "--epsg"
+    ]
 
 
 def _projected(
@@ -180,7 +247,8 @@ def _projected(
     if site.frame is None or site.system is None:
         zero = np.zeros(3)
         linear = {"map": zero, "projected": placement.translation, "matrix": placement.rotation}
-        return None, {"heading": placement.heading, "linear": linear}
+        described = {"translation": placement.translation, "std": placement.std_record()}
+        return None, {"heading": placement.heading, **described, "linear": linear}
     low = trajectory.positions.min(axis=0) - reach
     high = trajectory.positions.max(axis=0) + reach
     projection = MapProjection.over(low, high, site.frame, placement, site.system)

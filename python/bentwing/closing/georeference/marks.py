@@ -3,14 +3,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bentwing.base import geometry
 from bentwing.closing.georeference.control_points import Neighbourhood, plane_around
-from bentwing.closing.georeference.placement import Surfaces
+from bentwing.closing.georeference.placement import Positions, Surfaces
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -24,8 +24,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-FAR = 0.1
-"""m; nobody sees a mark farther off in a cloud."""
+_SHAPE = 0.01  # m, by which a map bends besides what the noise of its points explains
 
 
 @dataclass(slots=True)
@@ -38,12 +37,14 @@ class Marks:
     targets : (K, 3) m, their places, east, north, up
     around : points of the map near each
     planes : the surface found at each, None where there is none
+    false : numbers of control points that are not used, as they contradict the others
     """
 
     listed: Sequence[ControlPoint]
     targets: Array
     around: list[Neighbourhood]
     planes: list[Plane | None]
+    false: set[int] = field(default_factory=set)
 
     @classmethod
     def collect(
@@ -73,12 +74,21 @@ class Marks:
             for one, at, mark in zip(self.around, expected, self.listed, strict=True)
         ]
 
-    def surfaces(self, use: str = "control") -> tuple[Surfaces, Array]:
-        """Return the surfaces found at marks of one use, and their times (K,) s."""
+    @property
+    def used(self) -> list[int]:
+        """Numbers of the marks that hold the map."""
+        return [
+            number
+            for number, mark in enumerate(self.listed)
+            if mark.use == "control" and number not in self.false
+        ]
+
+    def surfaces(self, numbers: Sequence[int]) -> tuple[Surfaces, Array]:
+        """Return the surfaces found at some of the marks, and their times (K,) s."""
         rows = [
-            (plane, target)
-            for mark, plane, target in zip(self.listed, self.planes, self.targets, strict=True)
-            if plane is not None and mark.use == use
+            (plane, self.targets[number])
+            for number in numbers
+            if (plane := self.planes[number]) is not None
         ]
         if not rows:
             return Surfaces.none(), np.empty(0)
@@ -90,6 +100,38 @@ class Marks:
             np.array([plane.sigma for plane in planes]),
         )
         return surfaces, np.array([plane.time for plane in planes])
+
+    def seen(self, numbers: Sequence[int]) -> Positions:
+        """Return those of some of the marks that were seen in the map."""
+        picked = [number for number in numbers if self.listed[number].picked is not None]
+        sigmas = np.array([self.listed[number].sigma for number in picked])
+        return Positions(
+            np.array([self.listed[number].picked for number in picked]).reshape(-1, 3),
+            self.targets[picked],
+            sigmas[:, None, None] ** 2 * np.eye(3),
+        )
+
+    def n_measured(self, number: int) -> int:
+        """Count the measurements of a mark."""
+        return 3 * (self.listed[number].picked is not None) + (self.planes[number] is not None)
+
+    def misfit(self, number: int, placement: Placement) -> float:
+        """Sum of squared residuals of a mark in units of their noise, and of what a map bends."""
+        mark, plane, squares = self.listed[number], self.planes[number], 0.0
+        if mark.picked is not None:
+            squares += (self.seen_off(number, placement) / mark.sigma) ** 2
+        if plane is not None:
+            across = self._across(number, plane, placement)
+            squares += (across / float(np.hypot(plane.sigma, _SHAPE))) ** 2
+        return squares
+
+    def off(self, number: int, placement: Placement) -> float:
+        """Return how far a mark lies from where the map has it, m."""
+        plane = self.planes[number]
+        across = 0.0 if plane is None else abs(self._across(number, plane, placement))
+        if self.listed[number].picked is None:
+            return across
+        return max(across, self.seen_off(number, placement))
 
     def follow(self, before: Trajectory, after: Trajectory) -> None:
         """Move the collected points with the trajectory they were measured from."""
@@ -103,62 +145,52 @@ class Marks:
 
     def residuals(self, placement: Placement) -> list[float | None]:
         """Signed distance, m, of each mark's surface from the mark along the normal, up or outward."""
-        found: list[float | None] = []
-        for plane, target in zip(self.planes, self.targets, strict=True):
-            if plane is None:
-                found.append(None)
-                continue
-            gap = placement.to_level(plane.middle[None])[0] - target
-            found.append(float(gap @ (placement.rotation @ plane.normal)))
-        return found
+        return [
+            None if plane is None else self._across(number, plane, placement)
+            for number, plane in enumerate(self.planes)
+        ]
+
+    def _across(self, number: int, plane: Plane, placement: Placement) -> float:
+        gap = placement.to_level(plane.middle[None])[0] - self.targets[number]
+        return float(gap @ (placement.rotation @ plane.normal))
+
+    def seen_off(self, number: int, placement: Placement) -> float:
+        """Return how far from its place a mark was seen, m."""
+        picked = self.listed[number].picked
+        assert picked is not None
+        return float(np.linalg.norm(placement.to_level(picked[None])[0] - self.targets[number]))
 
     def table(self, placement: Placement, before: Sequence[float | None]) -> list[dict[str, Any]]:
         """Return one row per mark for run.json and the report."""
         rows = []
         after, places = self.residuals(placement), placement.to_map(self.targets)
-        for mark, plane, place, first, last in zip(
-            self.listed, self.planes, places, before, after, strict=True
-        ):
-            normal = None if plane is None else placement.rotation @ plane.normal
+        for number, (mark, plane) in enumerate(zip(self.listed, self.planes, strict=True)):
             rows.append(
                 {
                     "id": mark.name,
                     "use": mark.use,
-                    "in_map": place,
+                    "in_map": places[number],
                     "points": 0 if plane is None else plane.n_points,
-                    "normal": normal,
+                    "normal": None if plane is None else placement.rotation @ plane.normal,
                     "thickness": None if plane is None else plane.thickness,
-                    "before": first,
-                    "residual": last,
-                    "picked_off": None if mark.picked is None else self._off(mark, placement),
+                    "before": before[number],
+                    "residual": after[number],
+                    "picked_off": None if mark.picked is None else self.seen_off(number, placement),
+                    "contradicts": number in self.false,
                 }
             )
         return rows
 
-    def warnings(self, placement: Placement) -> list[str]:
-        """Name marks that have no surface, or lie elsewhere than the others say."""
-        said = []
+    def warnings(self) -> list[str]:
+        """Name marks that have no surface."""
         pairs = zip(self.listed, self.planes, strict=True)
         missing = [mark.name for mark, plane in pairs if plane is None and mark.picked is None]
-        if missing:
-            said.append(
-                f"no flat surface was found within the radius of {', '.join(missing)}: these "
-                "control points are not used"
-            )
-        for mark in self.listed:
-            off = None if mark.picked is None else self._off(mark, placement)
-            if off is not None and off > FAR:
-                said.append(
-                    f"{mark.name} was seen {off:.2f} m from where the other marks put it: check its "
-                    "coordinates and map_x, map_y, map_z, or give it the use check"
-                )
-        return said
-
-    def _off(self, mark: ControlPoint, placement: Placement) -> float:
-        """Return how far from its place a mark was seen, m."""
-        assert mark.picked is not None
-        target = self.targets[[one.name for one in self.listed].index(mark.name)]
-        return float(np.linalg.norm(placement.to_level(mark.picked[None])[0] - target))
+        if not missing:
+            return []
+        return [
+            f"no flat surface was found within the radius of {', '.join(missing)}: these "
+            "control points are not used"
+        ]
 
 
 def summary(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
@@ -166,7 +198,9 @@ def summary(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for use in ("control", "check"):
         left = [
-            row["residual"] for row in rows if row["use"] == use and row["residual"] is not None
+            row["residual"]
+            for row in rows
+            if row["use"] == use and row["residual"] is not None and not row["contradicts"]
         ]
         if left:
             squares = float(np.sqrt(np.mean(np.square(left))))

@@ -7,7 +7,7 @@ Gravity is known to the estimators far better than fixes could tell it, so the m
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 GATE = 16.27  # of three squared residuals in units of their noise; 0.1 % are beyond
 # Errors of fixes last: those within so many seconds are worth one.
 INDEPENDENT = 20.0
-_MEDIAN = 2.366  # of the same
+MEDIAN = 2.366  # of the same
 _N_PAIRS = 300
 _ITERATIONS = 30
 _CONVERGED = 1e-9
@@ -47,6 +47,10 @@ class Placement:
         """(3, 3)."""
         c, s = np.cos(self.heading), np.sin(self.heading)
         return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+    def std_record(self) -> dict[str, Any]:
+        """Return the standard deviations as run.json has them."""
+        return {"heading": float(self.std[0]), "translation": self.std[1:]}
 
     def to_level(self, points: Array) -> Array:
         """East, north, up (N, 3) of map points (N, 3)."""
@@ -145,7 +149,7 @@ def place(
         squared = _squared_residuals(positions, found)
         if len(squared):
             # Receivers are often too sure of themselves; never believe them more than they ask.
-            scale = max(1.0, float(np.median(squared)) / _MEDIAN)
+            scale = max(1.0, float(np.median(squared)) / MEDIAN)
             used = squared < GATE * scale
         step, covariance = _step(positions, used, scale, surfaces, found)
         found = Placement(

@@ -95,7 +95,7 @@ class MapProjection:
         return {
             "epsg": self.system.epsg,
             "crs": self.system.name,
-            "heights": "above the WGS 84 ellipsoid, unless the system has its own",
+            "heights": self.system.heights,
             "origin": {
                 "longitude": self.frame.longitude,
                 "latitude": self.frame.latitude,
@@ -103,10 +103,7 @@ class MapProjection:
             },
             "heading": self.placement.heading,
             "translation": self.placement.translation,
-            "std": {
-                "heading": float(self.placement.std[0]),
-                "translation": self.placement.std[1:],
-            },
+            "std": self.placement.std_record(),
             "convergence_deg": convergence,
             "point_scale": scale,
             "polynomial_error": self.error,

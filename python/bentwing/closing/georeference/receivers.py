@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,19 +27,23 @@ class Receivers:
     lever_arms : (N, 3) m, from the IMU to the antenna of each fix, IMU frame
     runs : (N,) which of the runs each fix is of
     names : of the runs
+    lever_stds : of the runs, m, by which the lever arm may be off along each axis; zero where it is known
     """
 
     fixes: Fixes
     lever_arms: NDArray[np.float64]
     runs: NDArray[np.intp]
     names: tuple[str, ...]
+    lever_stds: tuple[float, ...]
 
     @classmethod
-    def one(cls, fixes: Fixes, lever_arm: Sequence[float], name: str = "") -> Receivers:
+    def one(
+        cls, fixes: Fixes, lever_arm: Sequence[float], name: str = "", lever_std: float = 0.0
+    ) -> Receivers:
         """Return the fixes of one recording."""
         n = len(fixes.times)
         levers = np.tile(np.asarray(lever_arm, np.float64), (n, 1))
-        return cls(fixes, levers, np.zeros(n, np.intp), (name,))
+        return cls(fixes, levers, np.zeros(n, np.intp), (name,), (lever_std,))
 
     @classmethod
     def joined(cls, several: Sequence[Receivers]) -> Receivers:
@@ -57,7 +61,12 @@ class Receivers:
             np.concatenate([one.lever_arms for one in several]),
             np.concatenate(runs),
             tuple(name for one in several for name in one.names),
+            tuple(std for one in several for std in one.lever_stds),
         )
+
+    def moved(self, run: int, by: NDArray[np.float64]) -> Receivers:
+        """Return them with the antenna of one run elsewhere, by (3,) m in the IMU frame."""
+        return replace(self, lever_arms=self.lever_arms + np.outer(self.runs == run, by))
 
     def during(self, spans: Sequence[tuple[float, float]], offset: float = 0.0) -> Receivers:
         """Return those within spans of time, s, later by an offset, s."""
@@ -73,4 +82,5 @@ class Receivers:
             self.lever_arms[within],
             self.runs[within],
             self.names,
+            self.lever_stds,
         )

@@ -33,7 +33,6 @@ if TYPE_CHECKING:
 
 MAX_HEADING_STD = np.radians(15.0)  # worse than a compass: the map would point anywhere
 FEWEST_PICKED = 2
-PICKED = 0.02  # m, to which a mark is found in a cloud
 _SLACK = (0.3, 3.0)  # m, least and most by which a mark is looked for beside its place
 
 
@@ -117,17 +116,20 @@ class Site:
         if len(picked) < FEWEST_PICKED and (picked or listed.in_degrees):
             msg = (
                 f"{len(picked)} of {len(listed.points)} control points were seen in the map; without GNSS "
-                f"at least {FEWEST_PICKED} must have map_x, map_y, map_z"
+                f"at least {FEWEST_PICKED} must have map_x, map_y, map_z, or a time at which the carrier stood there"
             )
             raise NotEnoughDataError(msg)
         if not picked:
             return bare
         if listed.in_degrees or system is not None:
             bare = bare._around(listed)
-        seen = np.array([listed.points[number].picked for number in picked])
-        covariances = np.tile(PICKED**2 * np.eye(3), (len(picked), 1, 1))
-        targets = bare.targets_of(listed)[picked]
-        return replace(bare, positions=Positions(seen, targets, covariances))
+        marks = [listed.points[number] for number in picked]
+        positions = Positions(
+            np.array([mark.picked for mark in marks]),
+            bare.targets_of(listed)[picked],
+            np.array([mark.sigma**2 * np.eye(3) for mark in marks]),
+        )
+        return replace(bare, positions=positions)
 
     def _around(self, listed: ControlPoints) -> Site:
         """Return the site with a level frame in the middle of marks."""
@@ -155,6 +157,24 @@ class Site:
             )
             raise NotEnoughDataError(msg)
         return placement, used
+
+    def with_antenna(self, run: int, by: Array) -> Site:
+        """Return the site with the antenna of one run elsewhere, by (3,) m in the IMU frame."""
+        assert self.receivers is not None
+        receivers = self.receivers.moved(run, by)
+        p, q = self.original.interpolate(self.times)
+        levers = geometry.rotate(q, receivers.lever_arms)
+        positions = replace(self.positions, points=p + levers)
+        return replace(self, receivers=receivers, levers=levers, positions=positions)
+
+    @property
+    def n_known(self) -> int:
+        """Number of measurements of the place beside those of marks."""
+        return 3 * len(self.times)
+
+    def positions_of(self, marks: Marks, numbers: Sequence[int]) -> Positions:
+        """Return the fixes, or without any those of some marks that were seen in the map."""
+        return marks.seen(numbers) if self.receivers is None else self.positions
 
     def slack(self) -> float:
         """How far beside its place a control point is looked for, m."""
@@ -207,7 +227,7 @@ class Site:
             )
             observations.append(of_fixes(self.times[used], levers[used], positions))
         if marks is not None:
-            surfaces, times = marks.surfaces()
+            surfaces, times = marks.surfaces(marks.used)
             if len(times):
                 levers = surfaces.points - trajectory.interpolate(times)[0]
                 targets = placement.to_map(surfaces.targets)

@@ -3,21 +3,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bentwing.base.errors import UsageError
+from bentwing.base.errors import InputError, UsageError
 from bentwing.base.gps_time import adjusted_gps_origin
-from bentwing.base.run_record import finished_record
-from bentwing.base.trajectory import Trajectory, read_tum
+from bentwing.base.trajectory import Trajectory
 from bentwing.closing.places.cut import describe_parts
 from bentwing.closing.places.settings import PlaceSettings
 from bentwing.closing.places.stream import PartStream
 from bentwing.closing.places.tiles import tiled
-from bentwing.map.finished_run import map_of
+from bentwing.map.finished_run import FinishedRun
 from bentwing.map.read import read_parts
 
 if TYPE_CHECKING:
@@ -28,14 +27,17 @@ if TYPE_CHECKING:
     from bentwing.closing.places.place import Place
 
 
+_PAUSE = 60.0  # s, between runs that were merged, whenever they were recorded
+
+
 @dataclass(frozen=True, slots=True)
 class RunMap:
-    """The map of a run folder, and the way it was seen from.
+    """The map of a run folder, and the way it was seen from; merged runs count as if they had followed each other.
 
     Attributes
     ----------
     path : of the map's file
-    trajectory : on the clock of the run
+    trajectory : of all flights
     segments : first and last time of each stretch of it without a break, s
     georeference : of the map's coordinates, as run.json has it
     """
@@ -44,7 +46,7 @@ class RunMap:
     trajectory: Trajectory
     segments: list[tuple[float, float]]
     georeference: Mapping[str, Any] | None
-    _origin: float
+    _origins: NDArray[np.float64]
 
     def parts(self) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64] | None]]:
         """Points (N, 3) m, map frame, and their times (N,) on the clock of the trajectory if the map has any.
@@ -54,8 +56,14 @@ class RunMap:
         InputError
             If the map cannot be read.
         """
+        from bentwing.map.read_las import las_column  # laspy is slow to import
+
+        runs = las_column(self.path, "run_id") if len(self._origins) > 1 else iter(())
         for part in read_parts(self.path, self.georeference):
-            yield part.points, None if part.times is None else part.times - self._origin
+            if part.times is None:
+                yield part.points, None
+            else:
+                yield part.points, part.times - self._origins[next(runs, 0)]
 
 
 def map_of_run(folder: Path) -> RunMap:
@@ -64,23 +72,40 @@ def map_of_run(folder: Path) -> RunMap:
     Raises
     ------
     UsageError
-        If the folder holds no run, or the run has no map.
+        If the folder holds no run, or the run has no map, or one of merged runs that does not say which
+        run a point is of.
     InputError
-        If its trajectory cannot be read.
+        If a trajectory cannot be read.
     """
-    folder = Path(folder)
-    record = finished_record(folder)
-    segments = [(float(a), float(b)) for a, b in record.get("segments") or []]
-    begin = segments[0][0] if segments else 0.0
-    path = map_of(folder)
+    run = FinishedRun.open(folder)
+    run.require_one_map()
+    path = run.map_path
     if path is None:
         msg = f"{folder}: the run has no map; run `bentwing map` again, to its end and without --no-map"
         raise UsageError(msg)
-    absolute, first_ns = read_tum(folder / "trajectory.txt")
-    trajectory = Trajectory(absolute.times + begin, absolute.positions, absolute.quats_xyzw)
     is_las = path.suffix in {".laz", ".las"}
-    origin = adjusted_gps_origin(first_ns - round(begin * 1e9)) if is_las else 0.0
-    return RunMap(path, trajectory, segments, record.get("georeference"), origin)
+    if len(run.flights) > 1 and not is_las:
+        msg = f"{path}: does not say of which run a point is; merge the runs again as laz"
+        raise UsageError(msg)
+    ways: list[Trajectory] = []
+    segments: list[tuple[float, float]] = []
+    origins, end = [], -_PAUSE
+    for flight in run.flights:
+        way = flight.trajectory
+        if not len(way.times):
+            msg = f"{folder}: the trajectory of {flight.name} is gone; map or merge again"
+            raise InputError(msg)
+        late = end + _PAUSE - float(way.times[0]) if ways else 0.0
+        ways.append(replace(way, times=way.times + late))
+        segments += [(a + late, b + late) for a, b in flight.record.get("segments") or []]
+        origins.append((adjusted_gps_origin(flight.start_ns) if is_las else 0.0) - late)
+        end = float(ways[-1].times[-1])
+    joined = Trajectory(
+        np.concatenate([way.times for way in ways]),
+        np.concatenate([way.positions for way in ways]),
+        np.concatenate([way.quats_xyzw for way in ways]),
+    )
+    return RunMap(path, joined, segments, run.record.get("georeference"), np.array(origins))
 
 
 def places_of_run(folder: Path | str, settings: PlaceSettings | None = None) -> list[Place]:

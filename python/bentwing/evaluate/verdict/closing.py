@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""Whether the whole recording agrees with itself: loops, and surfaces seen in two visits."""
+"""Whether the whole recording agrees with itself and with what was surveyed: loops, visits, marks."""
 
 from __future__ import annotations
 
@@ -55,6 +55,22 @@ def judge_revisits(found: Revisits | None, sigma: float) -> list[Evidence]:
         return []
     expected = float(np.hypot(sigma, _OFFSET))
     return [Evidence("revisits", found.std / expected, (), {"millimetres": 1e3 * found.median})]
+
+
+def judge_marks(georeference: Mapping[str, Any] | None) -> list[Evidence]:
+    """Judge by the surveyed marks that contradict the others.
+
+    Parameters
+    ----------
+    georeference : as run.json has it; None without any
+    """
+    found = []
+    for one in (georeference or {}).get("contradictions") or []:
+        unused = "" if one["used"] else ", and is not used"
+        names = " or ".join(one["marks"])
+        facts = {"names": names, "metres": one["off"], "unused": unused}
+        found.append(Evidence("marks", 1.0, (), facts))
+    return found
 
 
 def _usual_drift(estimate: Estimate) -> float:

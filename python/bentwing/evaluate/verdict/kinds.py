@@ -179,6 +179,11 @@ KINDS: dict[str, Kind] = {
         "surfaces seen again lie {millimetres:.0f} mm apart",
         "look for doubled walls in the report",
     ),
+    "marks": Kind(
+        11, 0.5, _NEVER,
+        "{names} lies {metres:.2f} m from where the other surveyed marks put it{unused}",
+        "check its coordinates, and where it was seen in the map",
+    ),
     "speed": Kind(
         12, 40.0, 80.0,
         "the trajectory reaches {value:.0f} m/s at {at:.1f} s",

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from pydantic import field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from bentwing.recording.sections.section import Lever, Section, Topic, Vector, require_lever
 
@@ -15,10 +15,12 @@ class Gnss(Section):
     ----------
     topic : of the fixes; None where they are in a file
     lever_arm : m, phase centre of the antenna in the IMU frame
+    lever_arm_std : m, by which it may be off along each axis; the fixes say where the antenna is then
     """
 
     topic: Topic | None = None
     lever_arm: Lever = (0.0, 0.0, 0.0)
+    lever_arm_std: float = Field(default=0.0, ge=0.0, le=2.0)
 
     @field_validator("lever_arm")
     @classmethod

@@ -11,7 +11,7 @@ from bentwing.base.trajectory import DT
 from bentwing.closing.global_registration import Recorded, register_jointly
 from bentwing.closing.global_registration.stretches import Stretches
 from bentwing.closing.joining.matches import Match, Part
-from bentwing.evaluate.verdict import judge_closing, judge_revisits
+from bentwing.evaluate.verdict import judge_closing, judge_marks, judge_revisits
 from bentwing.odometry.segments import joined
 from bentwing.run.folder import RunFolder
 from bentwing.run.found import Found
@@ -219,7 +219,11 @@ def _one_map(
         map=written,
         runs=runs,
         stage_warnings=tuple(notes),
-        evidence=(*judge_closing(closing, placed), *judge_revisits(written.revisits, sigma)),
+        evidence=(
+            *judge_closing(closing, placed),
+            *judge_revisits(written.revisits, sigma),
+            *(judge_marks(on_earth.placed.record) if on_earth.placed else ()),
+        ),
         judged=tuple(reason for source in sources for reason in source.reasons),
     )
     say_warnings(found.progress, [note for note in notes if note not in found.said])

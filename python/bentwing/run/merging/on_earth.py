@@ -6,8 +6,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from bentwing.base.errors import NotEnoughDataError
+from bentwing.base.errors import NotEnoughDataError, UsageError
 from bentwing.base.trajectory import Trajectory
+from bentwing.closing.georeference.control_point_file import read_control_points
 from bentwing.closing.georeference.georeference import georeference
 from bentwing.closing.georeference.receivers import Receivers
 from bentwing.run.gnss import receivers_of
@@ -49,6 +50,24 @@ def settings_of_runs(
         if len(values) == 1:
             agreed[name] = values.pop()
     return wanted.model_copy(update=agreed)
+
+
+def require_places(wanted: GeoreferenceSettings) -> None:
+    """Refuse marks with times of standing, which several recordings would all understand.
+
+    Raises
+    ------
+    UsageError
+    """
+    if wanted.control_points is None:
+        return
+    timed = [p.name for p in read_control_points(wanted.control_points).points if p.standing]
+    if timed:
+        msg = (
+            f"{wanted.control_points}: {', '.join(timed[:3])} have times, and of several recordings nobody knows "
+            "of which; give their places in the merged map as map_x, map_y, map_z"
+        )
+        raise UsageError(msg)
 
 
 def place_on_earth(

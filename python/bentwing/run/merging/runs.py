@@ -24,7 +24,7 @@ from bentwing.run.check import require_coordinates, require_effect
 from bentwing.run.folder import RunFolder
 from bentwing.run.found import Found
 from bentwing.run.merging.maps import Ingredients, MergedMap, make_maps
-from bentwing.run.merging.on_earth import settings_of_runs
+from bentwing.run.merging.on_earth import require_places, settings_of_runs
 from bentwing.run.merging.source import Source, open_sources
 from bentwing.run.settings import merge_settings
 
@@ -106,6 +106,7 @@ def merge(
         runs=[resolved(Path(run)) for run in runs],
     )
     require_coordinates(settings.georeferencing)
+    require_places(settings.georeferencing)
     sources = open_sources([Path(run) for run in runs])
     settings = settled(settings, sources)
     if any(resolved(Path(out)) == resolved(source.folder) for source in sources):

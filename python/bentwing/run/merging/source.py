@@ -88,18 +88,20 @@ class Source:
         """
 
         def chunks(counts: dict[str, int]) -> Iterator[MapChunk]:
+            dropped = Counter[str]()
             with (
                 self.part() as part,
                 as_progress(progress).stage(f"map {self.name}", part.length) as shown,
             ):
                 yield from project(
-                    part.batches(shown, Counter()),
+                    part.batches(shown, dropped),
                     estimate.trajectory,
                     estimate.calibration,
                     segments=estimate.segments,
                     threads=threads,
                     counts=counts,
                 )
+                counts.update(part.recording.counts + dropped)
 
         return MapSource(estimate, self.start_ns, chunks)
 

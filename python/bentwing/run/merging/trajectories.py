@@ -41,6 +41,7 @@ def write_trajectories(
                 "name": source.name,
                 "folder": resolved(source.folder),
                 "recordings": source.recordings,
+                "head": {"name": source.payload.name, "kind": source.payload.lidar.kind},
                 "start_ns": source.start_ns,
                 "trajectory": name,
                 "T_map_run": _rigid(source.estimate, estimate),

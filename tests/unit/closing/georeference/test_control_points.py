@@ -3,8 +3,10 @@ import numpy as np
 import pytest
 
 from bentwing.base.errors import InputError
+from bentwing.base.trajectory import Trajectory
 from bentwing.closing.georeference.control_point_file import RADIUS, read_control_points
-from bentwing.closing.georeference.control_points import plane_around
+from bentwing.closing.georeference.control_points import ControlPoint, Standing, plane_around
+from bentwing.closing.georeference.standing import with_places
 
 
 def read(tmp_path, text):
@@ -97,3 +99,34 @@ def test_where_there_is_no_surface_there_is_no_plane():
     assert plane_around(points, times, np.array([9.0, 9, 9]), 0.3) is None
     line = np.c_[np.linspace(-1, 1, 500), np.zeros((500, 2))]
     assert plane_around(line, np.zeros(500), np.zeros(3), 0.3) is None
+
+
+def test_a_time_of_standing_stands_for_a_place_in_the_map(tmp_path):
+    (point,) = read(
+        tmp_path,
+        "id;x;y;z;time;until;foot_x;foot_y;foot_z;sigma\nA;1;2;3;12,5;14;0;0;-0,35;0,01\n",
+    ).points
+    assert (point.standing.first, point.standing.last) == (12.5, 14.0)
+    assert point.standing.foot.tolist() == [0, 0, -0.35]
+    assert point.sigma == 0.01
+    assert point.picked is None
+
+
+def test_a_mark_is_where_the_foot_of_the_carrier_stood():
+    times = np.linspace(0.0, 10.0, 101)
+    way = Trajectory(
+        times,
+        np.column_stack([np.clip(times - 5, 0, None), 0 * times, 1.2 + 0 * times]),
+        np.tile([0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)], (101, 1)),
+    )
+
+    def stood(first, last):
+        foot = Standing(first, last, np.array([0.3, 0.0, -1.2]))
+        return with_places([ControlPoint("A", np.zeros(3), 0.3, "control", standing=foot)], way)
+
+    (point,) = stood(1.0, 4.0)
+    np.testing.assert_allclose(point.picked, [0.0, 0.3, 0.0], atol=1e-9)
+    with pytest.raises(InputError, match=r"moved by 1\.00 m"):
+        stood(4.0, 6.0)
+    with pytest.raises(InputError, match="the trajectory goes from"):
+        stood(9.0, 12.0)

@@ -222,8 +222,10 @@ def test_a_mark_that_disagrees_is_named_and_not_believed(tmp_path):
     assert (
         np.abs(found.to_projected(np.zeros((1, 3))) - grid.to_level(np.zeros((1, 3)))).max() < 0.03
     )
-    (said,) = [text for text in found.warnings if "other marks" in text]
-    assert said.startswith("floor3 was seen 3.4")
+    (one,) = found.record["contradictions"]
+    assert one["marks"] == ["floor3"]
+    assert one["off"] == pytest.approx(3.46, abs=0.05)
+    assert not one["used"]
 
 
 def test_marks_on_a_grid_that_nobody_has_seen_in_the_map_say_the_way_out(tmp_path):

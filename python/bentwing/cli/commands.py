@@ -20,6 +20,7 @@ COMMANDS = {
     "merge": "Put several runs into one map.",
     "export": "Write a run's map or trajectory in another form.",
     "info": "Check whether a recording is fit for mapping.",
+    "live": "Run odometry live, among the topics of ROS 2.",
     "payload": "Write a payload.yaml to start from, or list ready ones.",
     "calibrate": "Calibrate a sensor head: motor, IMU and clocks.",
     "plan": "Plan a flight: spin rate, point spacing, coverage.",

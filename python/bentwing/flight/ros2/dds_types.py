@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import functools
 import importlib
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_typestore
 
-if TYPE_CHECKING:
-    from types import ModuleType
+from bentwing.base.errors import UsageError
 
 _NUMBERS = {
     "bool": bool, "string": str, "int8": "int8", "uint8": "uint8", "byte": "uint8", "char": "uint8",
@@ -65,7 +64,6 @@ def _of_bytes(made: Any, raw: bytes) -> Any:  # noqa: ANN401
 def _structure(kind: str) -> Any:  # noqa: ANN401 - likewise
     idl: Any = importlib.import_module("cyclonedds.idl")
     _, fields = get_typestore(Stores.ROS2_HUMBLE).fielddefs[kind]
-    # ROS's own compiler of definitions gives an empty message one byte, too.
     members = {name: _member(description) for name, description in fields}
     name = type_name(kind)
     made: Any = idl.make_idl_struct(name.rpartition("::")[2], name, members)
@@ -86,19 +84,16 @@ def _member(description: Any) -> Any:  # noqa: ANN401 - as rosbags nests them
     return types.sequence[_member(inner)]
 
 
-def require_dds() -> ModuleType:
-    """Return the binding of DDS.
+def require_dds() -> None:
+    """Refuse to go on without the binding of DDS.
 
     Raises
     ------
     UsageError
         It is not installed.
     """
-    from bentwing.base.errors import UsageError
-
     try:
-        import cyclonedds
+        importlib.import_module("cyclonedds")
     except ImportError as error:
         msg = f"ROS 2 needs cyclonedds, which cannot be loaded ({error}); install it with `pip install cyclonedds`"
         raise UsageError(msg) from None
-    return cyclonedds

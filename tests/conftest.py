@@ -38,6 +38,11 @@ LIVOX_MSG = (
 )
 VELODYNE_PACKET = "builtin_interfaces/Time stamp\nuint8[1206] data"
 VELODYNE_SCAN = "std_msgs/Header header\nvelodyne_msgs/VelodynePacket[] packets"
+HESAI_SCANS = {  # and what they consist of
+    "hesai_lidar/msg/PandarScan": "hesai_lidar/msg/PandarPacket",
+    "hesai_ros_driver/msg/UdpFrame": "hesai_ros_driver/msg/UdpPacket",
+}
+RSLIDAR_PACKET = "std_msgs/Header header\nuint8 is_difop\nuint8 is_frame_begin\nuint8[] data"
 START = 1_700_000_000  # s, recorder's and header's time of t = 0
 
 
@@ -64,6 +69,12 @@ def _store(ros1: bool):
     store.register(get_types_from_msg(VELODYNE_PACKET, "velodyne_msgs/msg/VelodynePacket"))
     store.register(get_types_from_msg(VELODYNE_SCAN, "velodyne_msgs/msg/VelodyneScan"))
     store.register(get_types_from_msg("uint8[] buf", "ouster_ros/msg/PacketMsg"))
+    for scan, packet in HESAI_SCANS.items():
+        row = "builtin_interfaces/Time stamp\nuint8[] data\nuint32 size"
+        store.register(get_types_from_msg(row, packet))
+        rows = f"std_msgs/Header header\n{packet.replace('/msg/', '/')}[] packets"
+        store.register(get_types_from_msg(rows, scan))
+    store.register(get_types_from_msg(RSLIDAR_PACKET, "rslidar_msg/msg/RslidarPacket"))
     if ros1:  # which ROS 2's store has
         tf = "geometry_msgs/TransformStamped[] transforms"
         store.register(get_types_from_msg(tf, "tf2_msgs/msg/TFMessage"))
@@ -175,6 +186,20 @@ class Messages:
         packet = self.types["velodyne_msgs/msg/VelodynePacket"]
         rows = [packet(self.header(s).stamp, np.frombuffer(data, np.uint8)) for s, data in packets]
         return self.types["velodyne_msgs/msg/VelodyneScan"](self.header(t), rows)
+
+    def hesai_scan(self, kind, t, packets):
+        """Scan of one of Hesai's drivers, whose rows are as long as its buffer."""
+        row = self.types[HESAI_SCANS[kind]]
+        stamp = self.header(t).stamp
+        rows = [
+            row(stamp, np.frombuffer(data.ljust(1500, b"\0"), np.uint8), len(data))
+            for data in packets
+        ]
+        return self.types[kind](self.header(t), rows)
+
+    def rslidar_packet(self, t, data, *, is_device):
+        packet = self.types["rslidar_msg/msg/RslidarPacket"]
+        return packet(self.header(t), int(is_device), 0, np.frombuffer(data, np.uint8))
 
     def ouster_packet(self, data: bytes):
         return self.types["ouster_ros/msg/PacketMsg"](np.frombuffer(data, np.uint8))

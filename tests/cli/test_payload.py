@@ -207,3 +207,27 @@ def test_several_flights_have_no_one_payload(bentwing, office, tmp_path, changed
     )  # fmt: skip
     assert said.code == 2
     assert "--write-payload with 2 flights" in said.err
+
+
+def test_ready_payloads_are_listed_and_can_be_named(bentwing, tmp_path, ros1):
+    listed = bentwing("payload", "list")
+    assert listed.code == 0
+    assert "dataset:hilti-2022" in listed.out
+    table = np.ones(64, [("x", "f4"), ("y", "f4"), ("z", "f4"), ("time", "f4")])
+    clouds = [("/velodyne_points", i / 10, ros1.cloud(i / 10, table)) for i in range(4)]
+    bag = ros1.write(tmp_path / "a.bag", clouds)
+    refused = bentwing("info", bag, "-p", "dataset:m2dgr")
+    assert "names the imu topic /handsfree/imu" in " ".join(refused.out.split())
+    unknown = bentwing("info", bag, "-p", "dataset:m2gdr")
+    assert unknown.code == 3
+    assert "give one of" in unknown.err
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [(["init"], "needs the recording"), (["list", "a.bag"], "neither recordings nor --out")],
+)
+def test_an_action_with_too_little_or_too_much_is_refused(bentwing, words, says):
+    said = bentwing("payload", *words)
+    assert said.code == 2
+    assert says in said.err

@@ -33,7 +33,11 @@ payloads = st.fixed_dictionaries(
     optional={
         "name": st.text(max_size=20),
         "lidar": st.fixed_dictionaries(
-            {"kind": st.sampled_from(["hokuyo-utm30lx", "vlp16", "ouster", "livox", "hesai"])},
+            {
+                "kind": st.sampled_from(
+                    ["hokuyo-utm30lx", "vlp16", "ouster", "livox", "hesai", "robosense"]
+                )
+            },
             optional={
                 "topic": topic,
                 "range_sigma": positive,

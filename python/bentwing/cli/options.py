@@ -13,6 +13,7 @@ from bentwing.closing.georeference.names import GeoreferenceMode
 from bentwing.map.formats import MapFormat
 from bentwing.odometry.names import EstimatorName
 from bentwing.recording.gnss_files.names import TimeScale
+from bentwing.recording.ready import payload_path
 
 # The groups of a help page, in its order.
 INPUT = "Input"
@@ -43,8 +44,12 @@ def out(*aliases: str, **details: Any) -> Any:  # noqa: ANN401 - typer's own
 
 def payload(**details: Any) -> Any:  # noqa: ANN401 - typer's own
     """Return the option that names the description of the sensor head."""
-    help_line = "Description of the sensor head, payload.yaml."
-    return option(INPUT, "--payload", "-p", metavar="FILE", help=help_line, **details)
+    help_line = (
+        "Description of the sensor head: payload.yaml, or dataset:NAME of `bentwing payload list`."
+    )
+    return option(
+        INPUT, "--payload", "-p", metavar="FILE", help=help_line, parser=payload_path, **details
+    )
 
 
 def out_file(help_line: str) -> Any:  # noqa: ANN401 - typer's own
@@ -63,15 +68,14 @@ def cleaning(*, keep_mixed: bool, keep_moving: bool) -> dict[str, bool]:
     return {name: False for name, is_kept in kept.items() if is_kept}
 
 
-Recording = Annotated[
-    list[Path],
-    typer.Argument(
-        metavar="RECORDING",
-        help="ROS 1 .bag, ROS 2 bag folder, .db3, .mcap or .pcap; several parts of one recording "
-        "one after the other.",
-        rich_help_panel=INPUT,
-    ),
-]
+_RECORDING = typer.Argument(
+    metavar="RECORDING",
+    help="ROS 1 .bag, ROS 2 bag folder, .db3, .mcap or .pcap; several parts of one recording "
+    "one after the other.",
+    rich_help_panel=INPUT,
+)
+Recording = Annotated[list[Path], _RECORDING]
+SomeRecording = Annotated[list[Path] | None, _RECORDING]
 Payload = Annotated[Path | None, payload()]
 Start = Annotated[
     float | None, option(INPUT, metavar="SECONDS", min=0, help="Time to skip at the start.")

@@ -8,6 +8,7 @@ import typer
 
 from bentwing.cli import options
 from bentwing.cli.options import INPUT, RESULT, option
+from bentwing.recording.ready import payload_path
 
 EXAMPLES = (
     "bentwing plan payload.yaml",
@@ -20,8 +21,9 @@ def command(  # noqa: PLR0917 - one parameter per option
         Path,
         typer.Argument(
             metavar="FILE",
-            help="Description of the sensor head, payload.yaml.",
+            help="Description of the sensor head: payload.yaml, or dataset:NAME of `bentwing payload list`.",
             rich_help_panel=INPUT,
+            parser=payload_path,
         ),
     ],
     distance: Annotated[

@@ -18,6 +18,7 @@ from bentwing.base.units import Unit
 from bentwing.base.validation import describe
 from bentwing.base.yaml_files import read_yaml
 from bentwing.fleet.entry import Entry
+from bentwing.recording.ready import payload_path
 from bentwing.run.settings import MOST_SECONDS
 
 if TYPE_CHECKING:
@@ -36,6 +37,11 @@ class Known(Settings):
     payload: Path | None = Field(default=None, description="description of the sensor head")
     project: Path | None = Field(default=None, description="YAML file of what the report names")
     marks: Path | None = Field(default=None, description="CSV file of control points")
+
+    @field_validator("payload")
+    @classmethod
+    def _comes_with_bentwing_or_not(cls, payload: Path | None) -> Path | None:
+        return None if payload is None else payload_path(payload)
 
 
 class Row(Known):

@@ -7,6 +7,8 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from bentwing.base.memory import memory_of_machine
+
 if TYPE_CHECKING:
     from bentwing.closing.global_registration.settings import GlobalSettings
 
@@ -49,7 +51,7 @@ def _free_of_machine() -> float:
     except OSError:
         pass
     # Other systems do not say what is free; half of all is a modest guess.
-    return 0.5 * os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    return 0.5 * memory_of_machine()
 
 
 def _free_of_group() -> float | None:

@@ -23,6 +23,7 @@ from bentwing.fleet.plan import Choice, plan
 from bentwing.fleet.pool import Job
 from bentwing.fleet.record import Site
 from bentwing.fleet.task import Mapped, finished, map_recording_of, reason_of, sentence_of
+from bentwing.recording.ready import payload_path
 from bentwing.report.site import write_site_page
 from bentwing.run.settings import merge_settings
 
@@ -83,7 +84,7 @@ def map_fleet(
     choice = Choice(
         None if settings is None else Path(settings),
         (),
-        None if payload is None else Path(payload),
+        None if payload is None else payload_path(payload),
         options,
     )
     shown = as_progress(progress)

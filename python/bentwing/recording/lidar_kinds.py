@@ -6,9 +6,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-LidarKind = Literal["hokuyo-utm30lx", "vlp16", "ouster", "livox", "hesai", "generic"]
+LidarKind = Literal["hokuyo-utm30lx", "vlp16", "ouster", "livox", "hesai", "robosense", "generic"]
 # The models whose raw packets can be read; needed where the packets do not tell.
 VelodyneModel = Literal["hdl32e", "vlp16", "puck-hires", "vlp32a", "vlp32b", "vlp32c", "vls128"]
+RobosenseModel = Literal["rs16", "rs32", "helios"]
+PacketModel = Literal[VelodyneModel, RobosenseModel]
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,5 +29,6 @@ KIND_DEFAULTS: dict[LidarKind, KindDefaults] = {
     "ouster": KindDefaults(0.5, 100.0, 0.02),
     "livox": KindDefaults(0.3, 100.0, 0.02),
     "hesai": KindDefaults(0.3, 120.0, 0.02),
+    "robosense": KindDefaults(0.4, 120.0, 0.02),
     "generic": KindDefaults(0.3, 100.0, 0.02),
 }

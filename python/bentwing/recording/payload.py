@@ -20,6 +20,7 @@ from bentwing.base.errors import PayloadError
 from bentwing.base.validation import describe
 from bentwing.base.yaml_files import read_yaml
 from bentwing.recording.payload_text import payload_text
+from bentwing.recording.ready import payload_path
 from bentwing.recording.sections.calibration import CalibrationRecord
 from bentwing.recording.sections.encoder import Encoder
 from bentwing.recording.sections.gnss import Gnss
@@ -65,7 +66,7 @@ class Payload(Section):
 
     @classmethod
     def load(cls, path: Path | str) -> Payload:
-        """Read a payload.yaml.
+        """Read a payload.yaml, or one that comes with bentwing, as `dataset:NAME`.
 
         Raises
         ------
@@ -73,12 +74,13 @@ class Payload(Section):
             The file cannot be read or is invalid; all problems in one sentence.
         """
         advice = "give the payload.yaml that describes the sensor head"
-        data = read_yaml(Path(path), advice, PayloadError)
+        path = payload_path(path)
+        data = read_yaml(path, advice, PayloadError)
         if not isinstance(data, dict):
             msg = f"{path}: expected a mapping of sections (lidar, imu, T_imu_lidar, …), found {type(data).__name__}"
             raise PayloadError(msg)
         try:
-            return cls.model_validate(data, context={"folder": Path(path).parent})
+            return cls.model_validate(data, context={"folder": path.parent})
         except ValidationError as error:
             raise PayloadError(describe(error, cls, path)) from None
 

@@ -25,14 +25,21 @@ OUSTER_PACKETS = (
 # Datagrams in a pcap.
 UDP_VELODYNE, UDP_OUSTER_LIDAR = "udp/velodyne", "udp/ouster_lidar"
 UDP_OUSTER_IMU = "udp/ouster_imu"
+# Of Hesai's drivers, old and new, and of RoboSense's.
+HESAI_SCANS = ("hesai_lidar/msg/PandarScan", "hesai_ros_driver/msg/UdpFrame")
+RSLIDAR_PACKET = "rslidar_msg/msg/RslidarPacket"
+UDP_HESAI, UDP_ROBOSENSE = "udp/hesai", "udp/robosense"
+UDP_ROBOSENSE_DEVICE = "udp/robosense_device"  # the angles of its beams, among others
 STRING = "std_msgs/msg/String"
 VELODYNE_TYPES = (VELODYNE_SCAN, UDP_VELODYNE)
 OUSTER_TYPES = (*OUSTER_PACKETS, UDP_OUSTER_LIDAR, UDP_OUSTER_IMU)
-PACKET_TYPES = (*VELODYNE_TYPES, *OUSTER_TYPES)
+HESAI_TYPES = (*HESAI_SCANS, UDP_HESAI)
+ROBOSENSE_TYPES = (RSLIDAR_PACKET, UDP_ROBOSENSE)
+PACKET_TYPES = (*VELODYNE_TYPES, *OUSTER_TYPES, *HESAI_TYPES, *ROBOSENSE_TYPES)
 # By preference: where a driver recorded both, its decoded messages need nothing else.
 LIDAR_TYPES = (
     tuple(LIDAR_MESSAGES),
-    (*VELODYNE_TYPES, *OUSTER_PACKETS, UDP_OUSTER_LIDAR),
+    (*VELODYNE_TYPES, *OUSTER_PACKETS, UDP_OUSTER_LIDAR, *HESAI_TYPES, *ROBOSENSE_TYPES),
 )
 IMU_TYPES = ((IMU,), (*OUSTER_PACKETS, UDP_OUSTER_IMU))
 NAV_SAT_FIX = "sensor_msgs/msg/NavSatFix"

@@ -12,6 +12,7 @@ from bentwing import odometry
 from bentwing.base.progress import as_progress
 from bentwing.closing.loop_file import read_loops
 from bentwing.recording.frames import placed_payload
+from bentwing.recording.ready import payload_path
 from bentwing.recording.sections.project import as_project
 from bentwing.run import stages
 from bentwing.run.beams import read_by
@@ -122,7 +123,7 @@ def map_recording(
         trust_payload=True if trust_payload else None,
         force=True if force else None,
     )
-    described = payload if isinstance(payload, (str, Path)) else None
+    described = payload_path(payload) if isinstance(payload, (str, Path)) else None
     found = run_recording(paths, out, chosen, described, resume=resume, progress=progress)
     return Run.of(Path(out), found)
 

@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
-import resource
 import sys
 import time
 from dataclasses import dataclass, field
 from datetime import datetime, timezone
 from typing import TYPE_CHECKING, Any
 
+from bentwing.base.memory import peak_memory
 from bentwing.base.plain import plain
 from bentwing.base.provenance import versions
 from bentwing.base.run_record import RUN_FOLDER
@@ -79,7 +79,7 @@ class RunRecord:
         total = time.monotonic() - self._since
         return {
             "timings": {**self.timings, **self.found.timings, "total": total},
-            "peak_memory_mb": round(_peak_memory() / 1e6, 1),
+            "peak_memory_mb": round(peak_memory() / 1e6, 1),
         }
 
     def to_json(self) -> dict[str, Any]:
@@ -106,9 +106,3 @@ class RunRecord:
             }
         )
         return described
-
-
-def _peak_memory() -> int:
-    """Most bytes this process ever held in memory."""
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return peak if sys.platform == "darwin" else peak * 1024

@@ -12,7 +12,7 @@ import numpy as np
 
 from bentwing.recording.messages.lidar_messages import LIDAR_MESSAGES, is_planar
 from bentwing.recording.messages.wire import BrokenMessageError
-from bentwing.recording.topics import OUSTER_TYPES
+from bentwing.recording.topics import HESAI_TYPES, OUSTER_TYPES, ROBOSENSE_TYPES
 
 if TYPE_CHECKING:
     from bentwing.recording.containers.interface import Source
@@ -30,6 +30,8 @@ NAMES: dict[str, LidarKind] = {
     "avia": "livox",
     "hesai": "hesai",
     "pandar": "hesai",
+    "rslidar": "robosense",
+    "helios": "robosense",
     "vlp16": "vlp16",
     "puck": "vlp16",
 }
@@ -54,6 +56,10 @@ def describe_lidar(source: Source, topic: TopicInfo) -> dict[str, Any]:
 def _by_name(topic: TopicInfo) -> LidarKind | None:
     if topic.type in OUSTER_TYPES:
         return "ouster"
+    if topic.type in HESAI_TYPES:
+        return "hesai"
+    if topic.type in ROBOSENSE_TYPES:
+        return "robosense"
     if "livox" in topic.type:
         return "livox"
     name = topic.name.lower().replace("-", "").replace("_", "")

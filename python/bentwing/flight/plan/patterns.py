@@ -73,5 +73,6 @@ PATTERNS: dict[LidarKind, ScanPattern] = {
     # Mid-360; its pattern does not repeat, 200,000 points per second are as many as 64 lines here
     "livox": _turning(10.0, 1.15, (-7.0, 52.0), 64),
     "hesai": _turning(10.0, 0.18, (-16.0, 15.0), 32),
+    "robosense": _turning(10.0, 0.2, (-25.0, 15.0), 32),
     "generic": _turning(10.0, 0.2, (-15.0, 15.0), 16),
 }

@@ -13,7 +13,14 @@ from typing import TYPE_CHECKING
 from bentwing.base.errors import RecordingError
 from bentwing.recording.containers.datagrams import LINKS, DatagramReader, FrameProblemError
 from bentwing.recording.containers.scanned import ScanEnd, ScannedMessage
-from bentwing.recording.topics import UDP_OUSTER_IMU, UDP_OUSTER_LIDAR, UDP_VELODYNE
+from bentwing.recording.topics import (
+    UDP_HESAI,
+    UDP_OUSTER_IMU,
+    UDP_OUSTER_LIDAR,
+    UDP_ROBOSENSE,
+    UDP_ROBOSENSE_DEVICE,
+    UDP_VELODYNE,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -36,6 +43,14 @@ NOT_UDP, INCOMPLETE, OTHER = "other/not_udp", "udp/incomplete", "udp/other"
 OUSTER_IMU_SIZE, OUSTER_IMU_PORT, OUSTER_LIDAR_PORT = 48, 7503, 7502
 # 16 columns of 20 bytes and 12 for each of the 16, 32, 64 or 128 beams.
 OUSTER_LEGACY_SIZES = (3392, 6464, 12608, 24896)
+PANDAR40P_SIZES = (1262, 1266)
+ROBOSENSE_SIZE = 1248
+# The first bytes of RoboSense's packets: points of two formats, and the device.
+ROBOSENSE = {
+    b"\x55\xaa\x05\x0a": UDP_ROBOSENSE,
+    b"\x55\xaa\x05\x5a": UDP_ROBOSENSE,
+    b"\xa5\xff\x00\x5a": UDP_ROBOSENSE_DEVICE,
+}
 
 
 def check_pcap(path: Path) -> None:
@@ -126,6 +141,11 @@ def _kind(datagram: Datagram) -> str:
     payload, size = datagram.payload, len(datagram.payload)
     if size == 1206 and payload[:2] == b"\xff\xee":
         return UDP_VELODYNE
+    # Hesai's later formats have a version and zeros behind their first bytes.
+    if payload[:2] == b"\xee\xff" or (size in PANDAR40P_SIZES and payload[:2] == b"\xff\xee"):
+        return UDP_HESAI
+    if size == ROBOSENSE_SIZE and payload[:4] in ROBOSENSE:
+        return ROBOSENSE[payload[:4]]
     # Later formats begin with their type; heads, columns and beams add up to multiples of 64.
     is_later = payload[:2] == b"\1\0" and size > 1000 and size % 64 == 0
     if datagram.port == OUSTER_LIDAR_PORT or size in OUSTER_LEGACY_SIZES or is_later:

@@ -9,8 +9,16 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from bentwing.base.errors import RecordingError
 from bentwing.recording.messages import wire, wire_packets
-from bentwing.recording.packets import ouster, velodyne
-from bentwing.recording.topics import STRING, VELODYNE_TYPES
+from bentwing.recording.packets import hesai, ouster, robosense, velodyne
+from bentwing.recording.packets.blocks import BlockPackets
+from bentwing.recording.topics import (
+    HESAI_TYPES,
+    ROBOSENSE_TYPES,
+    RSLIDAR_PACKET,
+    STRING,
+    UDP_ROBOSENSE_DEVICE,
+    VELODYNE_TYPES,
+)
 
 if TYPE_CHECKING:
     from collections import Counter
@@ -76,6 +84,12 @@ def lidar_packets(
         library = _velodyne_decoder(topic.name)
         model = velodyne.find_model(first, lidar.model, topic.name)
         return functools.partial(velodyne.VelodynePackets, library, model, first[-1])
+    if topic.type in HESAI_TYPES:
+        return functools.partial(BlockPackets, hesai.find_model(first, lidar.metadata, topic.name))
+    if topic.type in ROBOSENSE_TYPES:
+        device = _robosense_device(source, topic)
+        table = robosense.find_model(first, device, lidar.model, topic.name)
+        return functools.partial(BlockPackets, table)
     core = _ouster_core(topic.name)
     info = _ouster_info(core, source, topic, lidar)
     ouster.check(core, info, first, topic.name)
@@ -133,3 +147,26 @@ def _ouster_info(core: ModuleType, source: Source, topic: TopicInfo, lidar: Lida
         "'lidar: {metadata: ...}'"
     )
     raise RecordingError(msg)
+
+
+def _robosense_device(source: Source, topic: TopicInfo) -> bytes | None:
+    """Return the first whole packet about the device that sent a topic, None where there is none."""
+    sender = topic.name.rpartition(":")[0]
+    names = {
+        other.name
+        for other in source.topics
+        if other.type == UDP_ROBOSENSE_DEVICE and other.name.rpartition(":")[0] == sender
+    }
+    is_of_driver = topic.type == RSLIDAR_PACKET
+    for _, _, raw in source.messages({topic.name} if is_of_driver else names):
+        data = raw
+        if is_of_driver:
+            try:
+                is_of_device, data = wire_packets.rslidar_packet(raw, cdr=source.cdr)
+            except wire.BrokenMessageError:
+                continue
+            if not is_of_device:
+                continue
+        if len(data) == robosense.SIZE and data[:4] == robosense.DEVICE:
+            return data
+    return None

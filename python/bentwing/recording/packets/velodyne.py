@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bentwing.recording.attributes import Attributes
-    from bentwing.recording.lidar_kinds import VelodyneModel
+    from bentwing.recording.lidar_kinds import PacketModel, VelodyneModel
 
 HOUR_NS = 3_600_000_000_000
 FLAG, LOWER_FLAG = b"\xff\xee", b"\xff\xdd"  # of a block of firings
@@ -52,7 +52,7 @@ MODELS: dict[VelodyneModel, Model] = {
 }
 
 
-def find_model(packet: bytes, told: VelodyneModel | None, topic: str) -> VelodyneModel:
+def find_model(packet: bytes, told: PacketModel | None, topic: str) -> VelodyneModel:
     """Return the model that sent a packet.
 
     Parameters
@@ -74,8 +74,9 @@ def find_model(packet: bytes, told: VelodyneModel | None, topic: str) -> Velodyn
         raise RecordingError(msg)
     number = packet[VELODYNE_SIZE - 1]
     fitting = [name for name, model in MODELS.items() if model.number == number]
-    if told is not None and (told in fitting or not fitting):
-        return told
+    for name in fitting or MODELS:
+        if name == told:
+            return name
     if told is None and len(fitting) == 1:
         return fitting[0]
     choice = ", ".join(fitting or MODELS)

@@ -10,7 +10,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from bentwing.base.units import Unit
 from bentwing.recording.attributes import stored_name
-from bentwing.recording.lidar_kinds import KIND_DEFAULTS, LidarKind, VelodyneModel
+from bentwing.recording.lidar_kinds import KIND_DEFAULTS, LidarKind, PacketModel
 from bentwing.recording.sections.beams import Beams
 from bentwing.recording.sections.ranges import Ranges
 from bentwing.recording.sections.section import NonNegative, Offset, Positive, Section, Topic
@@ -50,7 +50,7 @@ class Lidar(Section):
 
     topic: Topic | None = None
     kind: LidarKind = "generic"
-    model: VelodyneModel | None = None
+    model: PacketModel | None = None
     metadata: Annotated[str, Field(min_length=1)] | None = None
     min_range: Annotated[NonNegative, Unit("m")] = 0.0
     max_range: Annotated[Positive, Field(le=FARTHEST), Unit("m")] = 0.0

@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from bentwing.base.mount import Mount
     from bentwing.base.trajectory import Trajectory
     from bentwing.map.chunk import MapChunk
+    from bentwing.recording.messages.ros_messages import Message, RosMessages
     from bentwing.run.export.finished import Finished
-    from bentwing.run.export.ros_messages import Message, RosMessages
 
 SUFFIX = ".mcap"
 SPACING = 0.1  # m, of the points where nothing else is wished: viewers hold all of them
@@ -82,7 +82,7 @@ def write_mcap(path: Path, run: Finished, chunks: Generator[MapChunk, None, None
     # slow to import, so only when it is needed
     from rosbags.rosbag2 import StoragePlugin, Writer
 
-    from bentwing.run.export.ros_messages import RosMessages
+    from bentwing.recording.messages.ros_messages import RosMessages
 
     messages, connections, n_points = RosMessages(), {}, 0
     with TemporaryDirectory(dir=path.parent, prefix=f".{path.stem}-") as folder, closing(chunks):

@@ -76,7 +76,9 @@ def test_a_fixed_lidar_has_no_spin_and_sees_its_own_swath():
     assert made.coverage.blind_up == pytest.approx(made.coverage.blind_down, abs=0.12)
 
 
-@pytest.mark.parametrize("kind", ["hokuyo-utm30lx", "vlp16", "ouster", "livox", "hesai", "generic"])
+@pytest.mark.parametrize(
+    "kind", ["hokuyo-utm30lx", "vlp16", "ouster", "livox", "hesai", "robosense", "generic"]
+)
 def test_every_kind_of_lidar_can_be_planned(kind):
     made = plan({"lidar": {"kind": kind}, "imu": {}, "T_imu_lidar": {}})
     assert 0.0 < made.coverage.share <= 1.0

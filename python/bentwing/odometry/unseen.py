@@ -94,11 +94,13 @@ def unexplained_tilt(windows: Sequence[WindowRecord], imu: Imu | None) -> float:
 
     Residuals of the accelerometer are means over one second, smoothly weighted, over the noise of these.
     """
-    shown = [w.accel_rms for w in windows if w.accel_rms is not None]
+    shown = [w for w in windows if w.accel_rms is not None]
     if imu is None or not shown:
         return 0.0
-    beyond = max(0.0, float(np.mean(np.square(shown))) - 1.0)
-    return float(np.sqrt(1.5 * beyond)) * imu.accel_noise / STANDARD_GRAVITY
+    noise = [imu.accel_noise if w.imu_noise is None else w.imu_noise[1] for w in shown]
+    squares = np.square(np.array([w.accel_rms for w in shown], dtype=np.float64))
+    beyond = max(0.0, float((np.square(noise) @ squares) - np.sum(np.square(noise))) / len(shown))
+    return float(np.sqrt(1.5 * beyond)) / STANDARD_GRAVITY
 
 
 @dataclass(frozen=True, slots=True)

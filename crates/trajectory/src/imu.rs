@@ -121,6 +121,11 @@ impl Imu {
         Self::new(times, gyro, accel)
     }
 
+    /// Forces of the samples, with lines and polynomials in the place of what says nothing of the motion.
+    pub fn forces(&self) -> &[Vector3<f64>] {
+        &self.accel
+    }
+
     /// Number of samples.
     pub fn len(&self) -> usize {
         self.times.len()

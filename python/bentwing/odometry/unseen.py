@@ -97,9 +97,10 @@ def with_frame(std: Std, frame: float) -> dict[str, list[float]]:
 def with_lever(std: Std, lever: Array) -> dict[str, list[float]]:
     """Return standard deviations of a calibration with a covariance (3, 3) of its lever arm added, m²."""
     name, added = "extrinsic_translation", np.sqrt(np.diag(lever))
-    if name not in std:
-        return {**std}
-    return {**std, name: np.hypot(std[name], added).tolist()}
+    known = {state: [*values] for state, values in std.items()}
+    if name in known:
+        known[name] = np.hypot(known[name], added).tolist()
+    return known
 
 
 def unexplained_tilt(windows: Sequence[WindowRecord], imu: Imu | None) -> float:

@@ -17,10 +17,12 @@ if TYPE_CHECKING:
 
 # The median of the absolute values of normal numbers, in standard deviations.
 _MEDIAN = 0.6745
-# Second differences of white noise, -1 2 -1, are so much larger than it.
-_SECOND = np.sqrt(6.0)
+# Fourth differences of white noise, 1 -4 6 -4 1, are so much larger than it.
+_FOURTH = np.sqrt(70.0)
 # A noise that is stated is right by so much: so far measured ones of simulated recordings are apart.
 _RIGHT = 1.5
+GYRO_FLOOR, ACCEL_FLOOR = 5e-4, 0.01
+"""rad/s/√Hz and m/s²/√Hz, that any carrier has: what it does beyond the noise is more than that."""
 # Fewer samples, s, do not tell.
 _ENOUGH = 1.0
 
@@ -77,12 +79,15 @@ class BelievedNoise:
         if len(imu.times) < 2 or np.ptp(imu.times) < _ENOUGH:
             return self
         shown = ImuNoise.of(imu)
-        most = ImuNoise(max(self.most.gyro, shown.gyro), max(self.most.accel, shown.accel))
+        most = ImuNoise(
+            max(self.most.gyro, shown.gyro, GYRO_FLOOR),
+            max(self.most.accel, shown.accel, ACCEL_FLOOR),
+        )
 
         def believed(stated: float, shown: float, most: float) -> float:
             if shown > _RIGHT * stated:
                 return shown
-            is_too_large = settled and 0.0 < _RIGHT * most < stated
+            is_too_large = settled and _RIGHT * most < stated
             return most if is_too_large else stated
 
         now = ImuNoise(
@@ -96,9 +101,10 @@ def _density(samples: NDArray[np.float64], step: float) -> float:
     """Return the density of white noise in samples (M, 3) that are `step` seconds apart.
 
     Estimators see averages over a step of the trajectory, in which vibration at the samples' own rate
-    cancels. Motion is smooth over three of them and cancels in their second differences.
+    cancels. Motion is smooth over five of them and cancels in their fourth differences: in second ones a head
+    that nods leaves three times the noise of a gyro.
     """
     n = max(1, round(DT / step))
     means = samples[: len(samples) // n * n].reshape(-1, n, 3).mean(axis=1)
-    sigma = np.median(np.abs(np.diff(means, n=2, axis=0)), axis=0) / (_MEDIAN * _SECOND)
+    sigma = np.median(np.abs(np.diff(means, n=4, axis=0)), axis=0) / (_MEDIAN * _FOURTH)
     return float(sigma.max() * np.sqrt(n * step))

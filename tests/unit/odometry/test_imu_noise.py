@@ -25,8 +25,8 @@ def samples(noise: ImuNoise, seconds: float = 5.0, rate: float = 200.0) -> ImuBa
 @pytest.mark.parametrize("rate", [100.0, 200.0, 400.0])
 def test_the_noise_of_samples_is_measured_whatever_the_motion(rate):
     found = ImuNoise.of(samples(TRUE, rate=rate))
-    assert found.gyro == pytest.approx(TRUE.gyro, rel=0.15)
-    assert found.accel == pytest.approx(TRUE.accel, rel=0.15)
+    assert found.gyro == pytest.approx(TRUE.gyro, rel=0.2)
+    assert found.accel == pytest.approx(TRUE.accel, rel=0.2)
 
 
 @pytest.mark.parametrize("factor", [0.8, 1.0, 1.25])
@@ -39,8 +39,8 @@ def test_a_stated_noise_that_is_about_right_stays_exactly_what_it_is(factor):
 def test_samples_replace_a_noise_that_they_contradict(factor):
     stated = ImuNoise(factor * TRUE.gyro, factor * TRUE.accel)
     found = BelievedNoise.as_stated(stated).after(samples(TRUE), settled=True).now
-    assert found.gyro == pytest.approx(TRUE.gyro, rel=0.15)
-    assert found.accel == pytest.approx(TRUE.accel, rel=0.15)
+    assert found.gyro == pytest.approx(TRUE.gyro, rel=0.2)
+    assert found.accel == pytest.approx(TRUE.accel, rel=0.2)
 
 
 def test_a_carrier_that_is_still_calm_does_not_contradict_a_large_noise():

@@ -9,6 +9,7 @@ import numpy as np
 
 from bentwing.evaluate.verdict.evidence import Evidence
 from bentwing.evaluate.verdict.stretches import over_time
+from bentwing.odometry.imu_noise import ACCEL_FLOOR, GYRO_FLOOR
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -16,9 +17,6 @@ if TYPE_CHECKING:
     from bentwing.base.window_record import WindowRecord
     from bentwing.recording.sections.imu import Imu
 
-# Densities that any carrier has, rad/s/√Hz and m/s²/√Hz: who states less has not thought of vibration,
-# and that is no fault of the set-up.
-_GYRO_FLOOR, _ACCEL_FLOOR = 5e-4, 0.01
 _FEWEST = 4  # windows that can say something
 
 
@@ -39,8 +37,8 @@ def judge_rows(windows: Sequence[WindowRecord], imu: Imu | None) -> list[Evidenc
         if w.accel_rms is not None
     ]
     return [
-        *_judge("gyro_noise", gyro, _GYRO_FLOOR),
-        *_judge("accelerometer_noise", accel, _ACCEL_FLOOR),
+        *_judge("gyro_noise", gyro, GYRO_FLOOR),
+        *_judge("accelerometer_noise", accel, ACCEL_FLOOR),
     ]
 
 

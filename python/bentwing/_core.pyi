@@ -332,6 +332,10 @@ class Imu:
         accel: NDArray[np.float64],
         at_limit: NDArray[np.bool_] | None = None,
     ) -> Imu: ...
+    @property
+    def forces(self) -> NDArray[np.float64]:
+        """Forces (M, 3), m/s², without blows to the housing."""
+
     def __len__(self) -> int: ...
 
 @final

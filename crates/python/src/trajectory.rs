@@ -320,6 +320,13 @@ impl Imu {
         Ok(Self(RustImu::with_limits(stamps, gyro, accel, rows)))
     }
 
+    /// Forces (M, 3), m/s², without blows to the housing.
+    #[getter]
+    fn forces<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let rows: Vec<[f64; 3]> = self.0.forces().iter().map(|&f| f.into()).collect();
+        to_array2(py, &rows)
+    }
+
     fn __len__(&self) -> usize {
         self.0.len()
     }

@@ -3,6 +3,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use crate::blows::Blows;
 use crate::limits::{AtLimit, MAX_BRIDGE};
 use crate::{Trajectory, so3};
 
@@ -21,6 +22,7 @@ pub struct Imu {
     /// The same of the accelerometer, m/s.
     pushed: Vec<Vector3<f64>>,
     at_limit: AtLimit,
+    blows: Blows,
 }
 
 /// Integrals of the samples over an interval, imu frame, errors of the unit included.
@@ -43,8 +45,10 @@ pub struct NodeForce {
 }
 
 impl Imu {
-    /// Takes samples with increasing `times`; all slices have the same length.
-    pub fn new(times: Vec<f64>, gyro: Vec<Vector3<f64>>, accel: Vec<Vector3<f64>>) -> Self {
+    /// Takes samples with increasing `times`; all slices have the same length. Straight lines take the
+    /// place of forces that a ringing housing feigns.
+    pub fn new(times: Vec<f64>, gyro: Vec<Vector3<f64>>, mut accel: Vec<Vector3<f64>>) -> Self {
+        let blows = Blows::taken_out(&times, &mut accel);
         let (turned, pushed) = (integral(&times, &gyro), integral(&times, &accel));
         Self {
             times,
@@ -53,6 +57,7 @@ impl Imu {
             turned,
             pushed,
             at_limit: AtLimit::default(),
+            blows,
         }
     }
 
@@ -75,13 +80,17 @@ impl Imu {
 
     /// Which axes of gyro and accelerometer measured all that was in `[from, to]`.
     pub fn known(&self, from: f64, to: f64) -> [bool; 6] {
-        if self.at_limit.is_empty() {
+        if self.at_limit.is_empty() && self.blows.is_empty() {
             return [true; 6];
         }
         let first = self.times.partition_point(|&s| s <= from).saturating_sub(1);
         let last = self.times.partition_point(|&s| s < to);
-        self.at_limit
-            .none_in(first, last.min(self.len().max(1) - 1))
+        let last = last.min(self.len().max(1) - 1);
+        let mut known = self.at_limit.none_in(first, last);
+        if self.blows.any_in(first, last) {
+            known[3..].fill(false);
+        }
+        known
     }
 
     /// The same with samples on straight lines across short gaps, for a first guess of the motion.
@@ -110,6 +119,11 @@ impl Imu {
             accel.push(self.accel[k]);
         }
         Self::new(times, gyro, accel)
+    }
+
+    /// Forces of the samples, with lines and polynomials in the place of what says nothing of the motion.
+    pub fn forces(&self) -> &[Vector3<f64>] {
+        &self.accel
     }
 
     /// Number of samples.

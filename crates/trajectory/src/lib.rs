@@ -2,6 +2,7 @@
 #![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
+mod blows;
 mod correction_spline;
 mod head;
 mod imu;

@@ -44,7 +44,8 @@ impl AtLimit {
     /// Which axes are beside their limits in all samples `first ..= last`.
     pub fn none_in(&self, first: usize, last: usize) -> [bool; 6] {
         let before = self.before(first);
-        std::array::from_fn(|axis| self.counts[last][axis] == before[axis])
+        let until = self.counts.get(last).unwrap_or(&before);
+        std::array::from_fn(|axis| until[axis] == before[axis])
     }
 
     /// Puts quartics through the samples around them in the place of short stretches at a limit: a
@@ -90,7 +91,8 @@ impl AtLimit {
     }
 
     fn before(&self, sample: usize) -> [u32; 6] {
-        sample.checked_sub(1).map_or([0; 6], |k| self.counts[k])
+        let counts = sample.checked_sub(1).and_then(|k| self.counts.get(k));
+        counts.copied().unwrap_or_default()
     }
 
     fn is_at(&self, sample: usize, axis: usize) -> bool {

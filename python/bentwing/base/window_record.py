@@ -28,10 +28,12 @@ class WindowRecord:
     new_share : share of the features where nothing was seen before (filter)
     inlier_share : share of the matches that agree within two standard deviations
     residual_rms : of the matches, in units of the expected noise
-    gyro_rms, accel_rms : residuals of the IMU over a second, in units of what its stated noise leaves to
+    gyro_rms, accel_rms : residuals of the IMU over a second, in units of what its noise leaves to
         expect; None where the lidar cannot say (windows)
     gyro_correlation, accel_correlation : of residuals half a second apart, mean of the axes, beyond what
         is expected: 0 where the noise is white, towards 1 where it is an error that lasts (windows)
+    imu_noise : (2,) rad/s/√Hz and m/s²/√Hz, of gyro and accelerometer, which the window was weighted with:
+        as stated, unless its samples contradict that (windows)
     registration_rmse : root mean square distance from the reference, m (filter, NDT; Tazir 2020,
         figure 13)
     iterations : how often the matches were renewed
@@ -62,6 +64,7 @@ class WindowRecord:
     accel_rms: float | None = None
     gyro_correlation: float | None = None
     accel_correlation: float | None = None
+    imu_noise: list[float] | None = None
     registration_rmse: float | None = None
     iterations: int
     converged: bool

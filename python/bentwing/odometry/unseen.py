@@ -4,12 +4,13 @@
 All ranges of a lidar may be longer by a share, and so is the map; what they err by on a surface goes on with
 all of its returns, and beams that point elsewhere make a plane a slope. An accelerometer that errs by more than
 its noise tilts the map. The axes of an IMU lean in its housing, and the frame of the estimate is that of
-the gyro: all attitudes and the mount are turned against the housing, the map is not.
+the gyro: all attitudes and the mount are turned against the housing, the map is not. And where the IMU is on its head is
+seen by forces, to which vibration adds.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -81,6 +82,10 @@ def frame_std(calibration: Calibration, std: Std, imu: Imu | None) -> float:
     return float(np.sqrt(squares / weights))
 
 
+def _nowhere() -> Array:
+    return np.zeros((3, 3))
+
+
 def with_frame(std: Std, frame: float) -> dict[str, list[float]]:
     """Return standard deviations of a calibration with the frame of the IMU turned by `frame`, rad."""
     turned = {
@@ -89,16 +94,27 @@ def with_frame(std: Std, frame: float) -> dict[str, list[float]]:
     return {**std, **turned}
 
 
+def with_lever(std: Std, lever: Array) -> dict[str, list[float]]:
+    """Return standard deviations of a calibration with a covariance (3, 3) of its lever arm added, m²."""
+    name, added = "extrinsic_translation", np.sqrt(np.diag(lever))
+    known = {state: [*values] for state, values in std.items()}
+    if name in known:
+        known[name] = np.hypot(known[name], added).tolist()
+    return known
+
+
 def unexplained_tilt(windows: Sequence[WindowRecord], imu: Imu | None) -> float:
     """Return by how much a force turns the map that is as large as the unexplained residuals, rad.
 
     Residuals of the accelerometer are means over one second, smoothly weighted, over the noise of these.
     """
-    shown = [w.accel_rms for w in windows if w.accel_rms is not None]
+    shown = [w for w in windows if w.accel_rms is not None]
     if imu is None or not shown:
         return 0.0
-    beyond = max(0.0, float(np.mean(np.square(shown))) - 1.0)
-    return float(np.sqrt(1.5 * beyond)) * imu.accel_noise / STANDARD_GRAVITY
+    noise = [imu.accel_noise if w.imu_noise is None else w.imu_noise[1] for w in shown]
+    squares = np.square(np.array([w.accel_rms for w in shown], dtype=np.float64))
+    beyond = max(0.0, float((np.square(noise) @ squares) - np.sum(np.square(noise))) / len(shown))
+    return float(np.sqrt(1.5 * beyond)) / STANDARD_GRAVITY
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,6 +128,7 @@ class Unseen:
     slope : of what seems level, rad
     place : m, of each position
     turn, heading : rad, of each attitude, and of its heading besides
+    lever : (3, 3) m², covariance of where the IMU is on its head, IMU frame
     in_map : whether the poses are those in a given map, which has a scale, a heading and a vertical
     """
 
@@ -121,6 +138,7 @@ class Unseen:
     place: float = 0.0
     turn: float = 0.0
     heading: float = 0.0
+    lever: Array = field(default_factory=_nowhere)
     in_map: bool = False
 
     @classmethod
@@ -131,6 +149,7 @@ class Unseen:
         windows: Sequence[WindowRecord],
         payload: Payload,
         *,
+        lever: Array,
         in_map: bool = False,
     ) -> Unseen:
         """Return what is unseen of an estimate by what it has seen."""
@@ -143,6 +162,7 @@ class Unseen:
             place=common,
             turn=common / _AWAY,
             heading=_PLAY if isinstance(calibration.mount, MotorMount) else 0.0,
+            lever=lever,
             in_map=in_map,
         )
 
@@ -180,4 +200,8 @@ class Unseen:
         together = np.concatenate(effects, axis=2)
         own = np.square([self.turn] * 3 + [self.place] * 3)
         own[2] += self.heading**2
-        return np.asarray(together @ together.transpose(0, 2, 1) + np.diag(own))
+        shared = together @ together.transpose(0, 2, 1) + np.diag(own)
+        # The lidar is where it seems to be; the IMU beside it is not.
+        moved = turns[last] if self.in_map else turns[last] - turns[first]
+        shared[:, 3:, 3:] += moved @ self.lever @ moved.transpose(0, 2, 1)
+        return np.asarray(shared)

@@ -11,7 +11,7 @@ from bentwing.calibrate.set_up import edits
 from bentwing.calibrate.set_up.compare import findings_between
 from bentwing.calibrate.set_up.errors import DefectError, NotFoundError
 from bentwing.calibrate.set_up.motor import UNITS, describe_motor, zero_between
-from bentwing.calibrate.set_up.noise import ImuNoise, states_noise
+from bentwing.calibrate.set_up.noise import states_noise, with_at_least
 from bentwing.calibrate.set_up.planar import describe_by_trials
 from bentwing.calibrate.set_up.refine import Refinement
 from bentwing.calibrate.set_up.set_up import Finding, SetUp
@@ -19,6 +19,7 @@ from bentwing.calibrate.set_up.signals import Averages
 from bentwing.calibrate.set_up.spatial import describe_by_motion, followed
 from bentwing.calibrate.set_up.stretch import read_stretch
 from bentwing.calibrate.set_up.units import with_imu_units, with_range_unit
+from bentwing.odometry.imu_noise import ImuNoise
 from bentwing.odometry.planar import is_plane
 from bentwing.recording import EncoderBatch, Recording
 
@@ -116,7 +117,7 @@ class _Search:
         imu = self._stretch.read_as(start).imu
         _require_motion(imu)
         if not self._has_mount and not states_noise(start):
-            start = ImuNoise.of(imu).at_least_in(start)
+            start = with_at_least(start, ImuNoise.of(imu))
         if is_plane(points[:: max(1, len(points) // LOOKED_AT)]):
             return self._by_trials(start)
         found, stretch = self._by_motion(start, self._imu)

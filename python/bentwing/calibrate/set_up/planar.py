@@ -17,9 +17,9 @@ from bentwing.calibrate.set_up.crossings import Crossings, Reading
 from bentwing.calibrate.set_up.delays import likely_delays
 from bentwing.calibrate.set_up.errors import NotFoundError
 from bentwing.calibrate.set_up.mirrors import both_meanings
-from bentwing.calibrate.set_up.noise import ImuNoise
 from bentwing.calibrate.set_up.scans import Scans
 from bentwing.calibrate.set_up.trials import Trials
+from bentwing.odometry.imu_noise import ImuNoise
 from bentwing.recording import imu_units
 
 if TYPE_CHECKING:

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 
 from bentwing.base.mount import MotorMount
 from bentwing.calibrate.set_up import edits
-from bentwing.calibrate.set_up.noise import ImuNoise
+from bentwing.calibrate.set_up.noise import with_at_least
 from bentwing.calibrate.set_up.scales import require_scale_of_ranges
 from bentwing.calibrate.set_up.trial import richest, try_payload
+from bentwing.odometry.imu_noise import ImuNoise
 
 if TYPE_CHECKING:
     from bentwing.base.calibration import Calibration
@@ -44,7 +45,7 @@ class Refinement:
         read = stretch.read_as(wide)
         self._payload, self._has_mount = payload, has_mount
         self._stretch, self._threads = stretch, threads
-        self._wide = ImuNoise.of(read.imu).at_least_in(wide)
+        self._wide = with_at_least(wide, ImuNoise.of(read.imu))
         self._span = richest(read.imu, REFINED)
         self._tried = cache(self._tried_with)
 

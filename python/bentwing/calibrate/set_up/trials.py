@@ -7,14 +7,15 @@ from typing import TYPE_CHECKING
 
 from bentwing.base.mount import FixedMount
 from bentwing.calibrate.set_up import edits
+from bentwing.calibrate.set_up.noise import with_at_least
 from bentwing.calibrate.set_up.refine import Refinement
 from bentwing.calibrate.set_up.scales import require_scale_of_gyro, require_scale_of_ranges
 from bentwing.calibrate.set_up.trial import richest, try_payload
 
 if TYPE_CHECKING:
-    from bentwing.calibrate.set_up.noise import ImuNoise
     from bentwing.calibrate.set_up.stretch import Stretch
     from bentwing.calibrate.set_up.trial import Trial
+    from bentwing.odometry.imu_noise import ImuNoise
     from bentwing.recording import Payload
 
 TRIED, GLANCE = 6.0, 3.0  # s of the richest motion on which descriptions are tried, and first seen
@@ -164,7 +165,7 @@ class Trials:
 
     def _with(self, payload: Payload, rotation: float, length: float) -> Trial:
         wide = edits.with_std(
-            self._noise.at_least_in(payload),
+            with_at_least(payload, self._noise),
             extrinsic_rotation=rotation,
             extrinsic_translation=UNKNOWN_SHIFT if rotation > AS_DESCRIBED else 0.0,
             latency=UNKNOWN_LATENCY,

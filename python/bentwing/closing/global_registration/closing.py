@@ -19,7 +19,7 @@ from bentwing.closing.global_registration.fixed import fixed_piece
 from bentwing.closing.global_registration.matching import MatchingPlan
 from bentwing.closing.global_registration.outcome import closed_estimate, improved, record_of
 from bentwing.closing.global_registration.settings import GlobalSettings
-from bentwing.closing.global_registration.shown_noise import shown_noise
+from bentwing.closing.global_registration.shown_noise import shown_noise, with_believed_noise
 from bentwing.closing.global_registration.stretches import (
     Stretches,
     collect,
@@ -184,7 +184,7 @@ def register_jointly(
             [*fixed, *(_piece(s, r, settings.frozen) for r in recorded for s in r.segments)],
             settings=CoreSettings.of(
                 settings.registration(budget.seconds),
-                _cautious([r.payload for r in recorded]),
+                _cautious([with_believed_noise(r.payload, r.estimate) for r in recorded]),
                 max(interval_of(e) for e in estimates),
             ),
             plan=MatchingPlan(

@@ -19,7 +19,8 @@ from bentwing.odometry.continuous.slow_states import (
 )
 from bentwing.odometry.core_states import refined
 from bentwing.odometry.segments import joined
-from bentwing.odometry.unseen import Unseen, frame_std, with_frame
+from bentwing.odometry.unseen import Unseen, frame_std, with_frame, with_lever
+from bentwing.odometry.unseen_lever import lever_covariance
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -89,15 +90,19 @@ def closed_estimate(
     corrected, std = refined(estimate.calibration, slow), named_std(covariance, frozen)
     imu = payload.imu if has_imu else None
     frame = frame_std(corrected, estimate.calibration.std, imu)
-    calibration = replace(corrected, std={**estimate.calibration.std, **with_frame(std, frame)})
-    unseen = Unseen.of(frame, corrected, estimate.windows, payload, in_map=in_map)
+    trajectory = joined(moved, dt)
+    lever = lever_covariance(trajectory, imu)
+    calibration = replace(
+        corrected, std={**estimate.calibration.std, **with_lever(with_frame(std, frame), lever)}
+    )
+    unseen = Unseen.of(frame, corrected, estimate.windows, payload, lever=lever, in_map=in_map)
     poses = [
         unseen.covariances(part, segment)
         for part, segment in zip(_poses_of(found, moved, own), moved, strict=True)
     ]
     return replace(
         estimate,
-        trajectory=joined(moved, dt),
+        trajectory=trajectory,
         calibration=calibration,
         covariances=PoseCovariances.joined(poses),
         short_variances=_short_variances(found, moved, poses, own, unseen),

@@ -11,6 +11,18 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bentwing.base.estimate import Estimate
+    from bentwing.recording import Payload
+
+
+def with_believed_noise(payload: Payload, estimate: Estimate) -> Payload:
+    """Return a payload with the noise that the IMU has in most windows of an estimate."""
+    found = [w.imu_noise for w in estimate.windows if w.imu_noise is not None]
+    if payload.imu is None or not found:
+        return payload
+    gyro, accel = sorted(g for g, _ in found), sorted(a for _, a in found)
+    middle = len(found) // 2
+    noise = {"gyro_noise": gyro[middle], "accel_noise": accel[middle]}
+    return payload.model_copy(update={"imu": payload.imu.model_copy(update=noise)})
 
 
 def shown_noise(estimate: Estimate) -> tuple[list[float], list[tuple[float, float]]]:

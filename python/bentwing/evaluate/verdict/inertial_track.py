@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bentwing import _core
 from bentwing.base.trajectory import DT
 
 if TYPE_CHECKING:
@@ -16,10 +17,12 @@ if TYPE_CHECKING:
 
 # A silence of the IMU, s: nothing is known of what it would have measured.
 GAP = 0.15
+# A blow is recognized by what is so long before and behind it, s.
+REACH = 0.25
 
 
 class InertialTrack:
-    """Integrals of the samples over time, in the frame of the IMU.
+    """Integrals of the samples over time, in the frame of the IMU, without blows to its housing.
 
     Attributes
     ----------
@@ -29,6 +32,8 @@ class InertialTrack:
     def __init__(self) -> None:
         self.gaps: list[tuple[float, float]] = []
         self._kept: list[NDArray[np.float64]] = []
+        # The newest samples as they were measured, and how many of them are in the integrals already.
+        self._measured, self._n_done = np.empty((0, 7)), 0
         # Time, angular rate and force of the newest sample, and the integrals up to it.
         self._newest = np.empty((0, 7))
         self._sums = np.zeros(6)
@@ -36,6 +41,26 @@ class InertialTrack:
     def add(self, batch: ImuBatch) -> None:
         """Take the next samples."""
         rows = np.column_stack([batch.times, batch.gyro, batch.accel])
+        self._measured = np.vstack([self._measured, rows])
+        if len(rows):
+            self._integrate_until(float(rows[-1, 0]) - REACH)
+
+    def _integrate_until(self, time: float) -> None:
+        """Take measured samples up to `time`, s, and keep those that tell what follows."""
+        measured = self._measured
+        n = int(np.searchsorted(measured[:, 0], time, side="right"))
+        if n <= self._n_done:
+            return
+        forces = _core.Imu(
+            np.ascontiguousarray(measured[:, 0]),
+            np.ascontiguousarray(measured[:, 1:4]),
+            np.ascontiguousarray(measured[:, 4:]),
+        ).forces
+        self._integrate(np.column_stack([measured[:, :4], forces])[self._n_done : n])
+        first = int(np.searchsorted(measured[:, 0], time - REACH))
+        self._measured, self._n_done = measured[first:], n - first
+
+    def _integrate(self, rows: NDArray[np.float64]) -> None:
         rows = np.vstack([self._newest, rows])
         steps = np.diff(rows[:, 0])
         means = 0.5 * (rows[1:, 1:] + rows[:-1, 1:])
@@ -50,6 +75,7 @@ class InertialTrack:
     @property
     def table(self) -> NDArray[np.float64]:
         """(K, 7) times, s, and the integrals of angular rate, rad, and of force, m/s, up to them."""
+        self._integrate_until(np.inf)
         if len(self._kept) > 1:
             self._kept = [np.concatenate(self._kept)]
         return self._kept[0] if self._kept else np.empty((0, 7))

@@ -9,6 +9,7 @@ import numpy as np
 
 from bentwing.evaluate.verdict.evidence import Evidence
 from bentwing.evaluate.verdict.stretches import over_time
+from bentwing.odometry.imu_noise import ACCEL_FLOOR, GYRO_FLOOR
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -16,9 +17,6 @@ if TYPE_CHECKING:
     from bentwing.base.window_record import WindowRecord
     from bentwing.recording.sections.imu import Imu
 
-# Densities that any carrier has, rad/s/√Hz and m/s²/√Hz: who states less has not thought of vibration,
-# and that is no fault of the set-up.
-_GYRO_FLOOR, _ACCEL_FLOOR = 5e-4, 0.01
 _FEWEST = 4  # windows that can say something
 
 
@@ -26,19 +24,27 @@ def judge_rows(windows: Sequence[WindowRecord], imu: Imu | None) -> list[Evidenc
     """Judge by the residuals of the IMU in windows, in units of what its noise leaves to expect."""
     if imu is None:
         return []
-    gyro = [(w.time, w.gyro_rms) for w in windows if w.gyro_rms is not None]
-    accel = [(w.time, w.accel_rms) for w in windows if w.accel_rms is not None]
+    stated = [imu.gyro_noise, imu.accel_noise]
+    noise = [stated if w.imu_noise is None else w.imu_noise for w in windows]
+    gyro = [
+        (w.time, w.gyro_rms, n[0])
+        for w, n in zip(windows, noise, strict=True)
+        if w.gyro_rms is not None
+    ]
+    accel = [
+        (w.time, w.accel_rms, n[1])
+        for w, n in zip(windows, noise, strict=True)
+        if w.accel_rms is not None
+    ]
     return [
-        *_judge("gyro_noise", gyro, imu.gyro_noise, _GYRO_FLOOR),
-        *_judge("accelerometer_noise", accel, imu.accel_noise, _ACCEL_FLOOR),
+        *_judge("gyro_noise", gyro, GYRO_FLOOR),
+        *_judge("accelerometer_noise", accel, ACCEL_FLOOR),
     ]
 
 
-def _judge(
-    kind: str, known: Sequence[tuple[float, float]], stated: float, floor: float
-) -> list[Evidence]:
+def _judge(kind: str, known: Sequence[tuple[float, float, float]], floor: float) -> list[Evidence]:
     if len(known) < _FEWEST:
         return []
-    times, values = np.array(known).T
-    found = over_time(times, values * stated / np.hypot(stated, floor))
+    times, values, noise = np.array(known).T
+    found = over_time(times, values * noise / np.hypot(noise, floor))
     return [Evidence(kind, found.high, found.spans_over(kind, np.asarray))]

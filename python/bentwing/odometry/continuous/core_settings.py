@@ -6,6 +6,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from bentwing.odometry.continuous.settings import RegistrationSettings
+from bentwing.odometry.imu_noise import ImuNoise
 
 if TYPE_CHECKING:
     from bentwing.recording import Payload
@@ -30,3 +31,14 @@ class CoreSettings(RegistrationSettings):
             gyro_sigma=gyro * dt**-0.5,
             accel_sigma=accel * dt**-0.5,
         )
+
+    def with_noise(self, noise: ImuNoise, dt: float) -> CoreSettings:
+        """Return the settings with other densities."""
+        if noise == self.noise(dt):
+            return self
+        sigmas = {"gyro_sigma": noise.gyro * dt**-0.5, "accel_sigma": noise.accel * dt**-0.5}
+        return self.model_copy(update=sigmas)
+
+    def noise(self, dt: float) -> ImuNoise:
+        """Return the densities."""
+        return ImuNoise(self.gyro_sigma * dt**0.5, self.accel_sigma * dt**0.5)

@@ -17,6 +17,7 @@ from bentwing.odometry.continuous.drift import Drift
 from bentwing.odometry.continuous.final_poses import FinalPoses
 from bentwing.odometry.continuous.slow_states import N_STATES, SlowStatePrior, at_epoch, named_std
 from bentwing.odometry.continuous.views import FixedViews
+from bentwing.odometry.imu_noise import BelievedNoise
 from bentwing.odometry.start import levelling
 
 if TYPE_CHECKING:
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from bentwing.odometry.buffer import BatchBuffer, LidarStretch
     from bentwing.odometry.continuous.core_settings import CoreSettings
     from bentwing.odometry.continuous.settings import ContinuousSettings
+    from bentwing.recording import ImuBatch
 
 # The trajectory reaches this much beyond the newest stamp, for latencies of either sign, s.
 MARGIN = 0.05
@@ -65,6 +67,7 @@ class OdometryPass:
         self.n_blind = 0
         self.settings = settings
         self._core = core
+        self._noise = BelievedNoise.as_stated(core.noise(DT))
         self._threads = threads
         self._resting = resting
         self._origin = samples.start
@@ -105,7 +108,8 @@ class OdometryPass:
     def step(self, buffer: BatchBuffer, end: float) -> None:
         """Take the lidar data up to `end`, s, and register the window that ends there."""
         watch = time.perf_counter()
-        imu = self._imu(buffer, end)
+        samples = self._imu(buffer, end)
+        imu = _in_core(samples)
         extended, n_blind = self.samples.extended(imu, self.globals, end + MARGIN)
         self.samples = extended
         self.n_blind += n_blind
@@ -114,6 +118,8 @@ class OdometryPass:
         self._surfels.append((self._end, self._extract(stretch)))
         new, self._end = end - self._end, end
         watch = self._lap("surfels", watch)
+        if samples is not None:
+            self._noise = self._noise.after(samples, settled=not self.is_settling)
         self._register(imu, new)
         self._lap("register", watch)
         self._retire()
@@ -179,11 +185,10 @@ class OdometryPass:
         frozen._drift = deepcopy(self._drift)
         return frozen
 
-    def _imu(self, buffer: BatchBuffer, end: float) -> _core.Imu | None:
+    def _imu(self, buffer: BatchBuffer, end: float) -> ImuBatch | None:
         if not buffer.has_imu:
             return None
-        batch = buffer.imu(self._window_start(end) - 0.2, end + MARGIN + 0.2)
-        return _core.Imu(batch.times, batch.gyro, batch.accel, batch.at_limit)
+        return buffer.imu(self._window_start(end) - 0.2, end + MARGIN + 0.2)
 
     def _extract(self, stretch: LidarStretch) -> _core.Surfels:
         return _core.extract_surfels(
@@ -215,7 +220,7 @@ class OdometryPass:
             offset=self.prior.offset,
             frozen=self.prior.frozen.tolist(),
             joined=joined,
-            settings=self._core,
+            settings=self._core.with_noise(self._noise.now, DT),
             threads=self._threads,
         )
         moved = result.globals.moved_from(self.globals)
@@ -232,6 +237,7 @@ class OdometryPass:
         translation = list(result.translation_eigenvalues)
         rotation = list(result.rotation_eigenvalues)
         n_matches = result.n_matches + result.n_fixed_matches
+        has_imu = result.gyro_rms is not None or result.accel_rms is not None
         degenerate = n_matches == 0 or min(translation[0], rotation[0]) < MIN_EIGENVALUE
         return WindowRecord(
             time=self._end,
@@ -244,6 +250,7 @@ class OdometryPass:
             accel_rms=result.accel_rms,
             gyro_correlation=result.gyro_correlation,
             accel_correlation=result.accel_correlation,
+            imu_noise=[self._noise.now.gyro, self._noise.now.accel] if has_imu else None,
             iterations=result.n_outer,
             converged=result.converged,
             degenerate=degenerate,
@@ -287,3 +294,9 @@ class OdometryPass:
         now = time.perf_counter()
         self.timings[name] += now - since
         return now
+
+
+def _in_core(batch: ImuBatch | None) -> _core.Imu | None:
+    if batch is None:
+        return None
+    return _core.Imu(batch.times, batch.gyro, batch.accel, batch.at_limit)

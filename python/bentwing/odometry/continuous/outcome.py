@@ -17,7 +17,8 @@ from bentwing.odometry.continuous.slow_states import at_epoch, named_std
 from bentwing.odometry.core_states import refined
 from bentwing.odometry.health import unseen_sentences
 from bentwing.odometry.segments import joined
-from bentwing.odometry.unseen import Unseen, frame_std, with_frame
+from bentwing.odometry.unseen import Unseen, frame_std, with_frame, with_lever
+from bentwing.odometry.unseen_lever import lever_covariance
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -61,13 +62,14 @@ def estimate_of(
     middle = 0.5 * float(whole.times[0] + whole.times[-1])
     found = refined(described, slow)
     std = named_std(at_epoch(last.covariance, middle - slow.latency_epoch), last.prior.frozen)
-    frame = frame_std(found, std, payload.imu if has_imu else None)
+    imu = payload.imu if has_imu else None
+    frame, lever = frame_std(found, std, imu), lever_covariance(whole, imu)
     calibration = replace(
         found,
         gravity=np.array([0.0, 0.0, STANDARD_GRAVITY]),
-        std=with_frame(std, frame),
+        std=with_lever(with_frame(std, frame), lever),
     ).with_epoch(middle)
-    unseen = Unseen.of(frame, found, windows, payload)
+    unseen = Unseen.of(frame, found, windows, payload, lever=lever)
     covariances = [
         unseen.covariances(p.covariances(s), s) for p, s in zip(passes, segments, strict=True)
     ]

@@ -3,13 +3,12 @@
 
 use std::ops::Range;
 
-use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use crate::grid::{Level, N_AROUND, NONE, beside};
 use crate::noise::Noise;
 use crate::piece::Piece;
-use crate::sample::Sorted;
+use crate::sample::{Shot, Sorted};
 use crate::sheet::Sheet;
 use crate::split::{Half, split};
 use crate::spots::{Spot, Spots, dot, single};
@@ -180,7 +179,8 @@ fn residual(sorted: &Sorted, level: &Level, place: usize, spots: &mut Spots) -> 
 /// Of a range where the noise is not known, m.
 const UNIT: f64 = 0.002;
 
-/// The points around the middle of a cell's points; the middle, and the radius within which they are.
+/// The points around the middle of a cell's points; the middle (units of the map), and the radius (m) within
+/// which they are.
 fn gather(
     sorted: &Sorted,
     level: &Level,
@@ -188,17 +188,14 @@ fn gather(
     around: &[u32; N_AROUND],
     noise: Option<&Noise>,
     spots: &mut Spots,
-) -> Option<(Vector3<f64>, f64)> {
+) -> Option<([i32; 3], f64)> {
     let around = around.iter().filter(|&&c| c != NONE);
     let total: usize = around.clone().map(|&c| level.points(c).len()).sum();
     if total < sorted.settings.enough {
         return None;
     }
-    let own = level.points(cell);
-    let n_own = own.len() as f64;
-    let place = |i: usize| Vector3::from(sorted.shots[i].at.map(f64::from));
-    let middle = own.fold(Vector3::zeros(), |sum, i| sum + place(i)) / n_own;
-    let (from, radius) = (single(&middle), REACH * level.edge);
+    let middle = middle_of(&sorted.shots[level.points(cell)]);
+    let (unit, radius) = (sorted.unit(), REACH * level.edge);
     let most = (radius * radius) as f32;
     spots.clear();
     let every = total.div_ceil(MOST_SPOTS);
@@ -210,11 +207,11 @@ fn gather(
             .skip(skipped)
             .step_by(every)
         {
-            let at = [0, 1, 2].map(|a| shot.at[a] - from[a]);
+            let at = shot.from(&middle).map(|c| c * unit);
             if dot(&at, &at) < most {
                 spots.push(&Spot {
                     at,
-                    beam: shot.beam,
+                    beam: shot.beam(),
                     sigma: noise.map_or(UNIT, |n| n.of_step(shot.step)) as f32,
                     pass: shot.pass,
                 });
@@ -224,6 +221,15 @@ fn gather(
         skipped = (skipped + every - points.len() % every) % every;
     }
     (spots.len() * every.min(2) >= sorted.settings.enough / 2).then_some((middle, radius))
+}
+
+/// Of some shots, at least one.
+fn middle_of(shots: &[Shot]) -> [i32; 3] {
+    let first = shots[0].at;
+    let sum = shots.iter().fold([0_i64; 3], |sum, shot| {
+        [0, 1, 2].map(|a| sum[a] + i64::from(shot.at[a].wrapping_sub(first[a])))
+    });
+    [0, 1, 2].map(|a| first[a].wrapping_add((sum[a] / shots.len() as i64) as i32))
 }
 
 fn pieces_of(
@@ -253,7 +259,7 @@ fn pieces_of(
             if sheet.n_passes >= sorted.settings.fewest_passes
                 && sheet.n_points >= FEWEST_SPOTS as f64
             {
-                pieces.push(Piece::of(&middle, &sheet, half.as_ref()));
+                pieces.push(Piece::of(middle, &sheet, half.as_ref()));
             }
         }
     }

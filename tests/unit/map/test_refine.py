@@ -121,16 +121,16 @@ def test_beams_are_needed(tmp_path):
 
 
 def test_a_sample_is_used_once():
-    chunk = recording()[0]
-    sample = _core.SurfaceSample(
-        edge=0.05, n_levels=4, enough=80, fewest_passes=5.0, most_noise=0.03, pass_length=0.5
-    )
-    own = np.ones(len(chunk), np.bool_)
-    sample.add(chunk.points, beams=chunk.beams, ranges=chunk.ranges, times=chunk.times, own=own)
+    chunk, lengths = recording()[0], {"edge": 0.05, "pass_length": 0.5}
+    beams = {"beams": chunk.beams, "ranges": chunk.ranges, "times": chunk.times}
+    words = _core.shot_words(chunk.points, **beams, **lengths)
+    sizes = {"n_levels": 4, "enough": 80, "fewest_passes": 5.0, "most_noise": 0.03}
+    sample = _core.SurfaceSample(edge=0.05, **sizes)
+    sample.add(words, own=np.ones(len(chunk), np.bool_))
     sample.refine()
     with pytest.raises(RuntimeError, match="used up"):
         sample.refine()
     with pytest.raises(ValueError, match="edge: expected a positive number"):
-        _core.SurfaceSample(
-            edge=0.0, n_levels=4, enough=80, fewest_passes=5.0, most_noise=0.03, pass_length=0.5
-        )
+        _core.SurfaceSample(edge=0.0, **sizes)
+    with pytest.raises(ValueError, match="pass_length: expected a positive number"):
+        _core.shot_words(chunk.points, **beams, edge=0.05, pass_length=0.0)

@@ -44,7 +44,9 @@ impl Sample {
             .into_par_iter()
             .map(|cells| of_cells(&sorted, &layers, &noise, cells))
             .collect();
-        let (mut moves, mut sigmas) = (vec![0.0; sorted.n_own], vec![0.0; sorted.n_own]);
+        let n_own = sorted.n_own;
+        drop((sorted, layers)); // before there is room for the results
+        let (mut moves, mut sigmas) = (vec![0.0; n_own], vec![0.0; n_own]);
         for (place, shift, sigma) in found.into_iter().flatten() {
             moves[place as usize] = shift;
             sigmas[place as usize] = sigma;

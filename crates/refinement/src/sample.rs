@@ -165,3 +165,35 @@ impl Sorted {
         (self.settings.edge / f64::from(1 << FINE)) as f32
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn words_keep_a_shot(
+            at in prop::array::uniform3(-20_000.0..20_000.0_f64),
+            beam in prop::array::uniform3(-1.0..1.0_f32),
+            range in 0.1..200.0_f32,
+            time in -10.0..1e5_f64,
+        ) {
+            let edge = 0.05;
+            let words = words_of(&[at], &[beam], &[range], &[time], (edge, 0.25));
+            let shot = Shot::of(&words[0], 7);
+            for axis in 0..3 {
+                let unit = edge / f64::from(1 << FINE);
+                let off = at[axis] - f64::from(shot.at[axis]) * unit;
+                prop_assert!(off.abs() <= 0.5001 * unit);
+                prop_assert!((shot.beam()[axis] - beam[axis]).abs() <= 0.51 / TURN);
+                let share = (f64::from(shot.at[axis]) * unit / edge).rem_euclid(1.0);
+                prop_assert_eq!(shot.is_upper(axis, 0), share >= 0.5);
+            }
+            prop_assert_eq!(shot.step, step_of(range));
+            let pass = (time / 0.25).floor().rem_euclid(N_PASSES as f64);
+            prop_assert_eq!(f64::from(shot.pass), pass);
+            prop_assert_eq!(shot.place, 7);
+        }
+    }
+}

@@ -32,7 +32,7 @@ MOST_NOISE = 0.03  # m, of a range; what looks noisier is the shape of things
 # s; what is measured within it shares the error of the trajectory. A head that turns sees a surface in it
 # once.
 PASS_LENGTH = 0.25
-MOST_POINTS = 6_000_000  # that are looked at together, about 65 bytes each
+MOST_POINTS = 5_000_000  # that are looked at together, about 75 bytes each
 _HELD = 32_000_000  # bytes of moves that need no file
 _PARTS_AHEAD = 8  # chosen while those before them go to the disk
 _NEEDED = ("points", "beams", "ranges", "times")

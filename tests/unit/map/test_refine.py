@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
 import functools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -90,6 +91,14 @@ def test_the_number_of_threads_changes_no_byte(tmp_path):
     for a, b in zip(one, two, strict=True):
         assert a.points.tobytes() == b.points.tobytes()
         assert a.sigma.tobytes() == b.sigma.tobytes()
+
+
+@pytest.mark.parametrize("far", [26_214.4, -40_000.0])
+def test_a_map_far_from_its_origin_is_refined_as_well(tmp_path, far):
+    # Places in the map are whole numbers that begin anew every 52.4 km.
+    chunks = [replace(c, points=c.points + np.array([far, -far, 0.0])) for c in recording()]
+    found = refined(tmp_path, chunks)
+    assert heights(found).std() < 0.35 * heights(recording()).std()
 
 
 def test_few_points_stay_where_they_are(tmp_path):

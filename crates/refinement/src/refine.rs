@@ -121,7 +121,7 @@ impl Eight {
             let moved = known & mean.abs().simd_le(FARTHEST * self.sigma);
             shift = moved.select(mean, shift);
             sigma = moved.select(left.sqrt(), sigma);
-            open = open & !known;
+            open &= !known;
             if open.none() {
                 break;
             }

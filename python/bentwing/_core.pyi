@@ -46,6 +46,7 @@ __all__ = [
     "las_records",
     "register_globally",
     "register_window",
+    "shot_words",
     "solve_pose_graph",
     "thin_points",
 ]
@@ -223,7 +224,6 @@ class SurfaceSample:
     enough : points around the middle of a cell that make it large enough
     fewest_passes : effective number that must have seen a surface
     most_noise : m, of a range
-    pass_length : s, what is measured within it shares the error of the trajectory
     """
 
     def __new__(
@@ -234,18 +234,9 @@ class SurfaceSample:
         enough: int,
         fewest_passes: float,
         most_noise: float,
-        pass_length: float,
     ) -> SurfaceSample: ...
-    def add(
-        self,
-        points: NDArray[np.float64],
-        *,
-        beams: NDArray[np.float32],
-        ranges: NDArray[np.float32],
-        times: NDArray[np.float64],
-        own: NDArray[np.bool_],
-    ) -> None:
-        """Add points (N, 3) m, map frame, with the unit directions, lengths (m) and times (s) of their beams.
+    def add(self, words: NDArray[np.uint32], *, own: NDArray[np.bool_]) -> None:
+        """Add points (N, 5) as `shot_words` returns them, made for the same edge.
 
         Parameters
         ----------
@@ -895,6 +886,24 @@ class PoseGraphSolution:
     @property
     def converged(self) -> bool:
         """Whether the last step promised too little to go on."""
+
+def shot_words(
+    points: NDArray[np.float64],
+    *,
+    beams: NDArray[np.float32],
+    ranges: NDArray[np.float32],
+    times: NDArray[np.float64],
+    edge: float,
+    pass_length: float,
+) -> NDArray[np.uint32]:
+    """Return points (N, 3) m, map frame, as `SurfaceSample` takes them, (N, 5): few bytes for what waits.
+
+    Parameters
+    ----------
+    beams, ranges, times : unit directions, lengths (m) and times (s) of their beams
+    edge : m, of the smallest cells
+    pass_length : s, what is measured within it shares the error of the trajectory
+    """
 
 def solve_pose_graph(
     positions: NDArray[np.float64],

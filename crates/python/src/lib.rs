@@ -48,7 +48,7 @@ mod _core {
     #[pymodule_export]
     use crate::raycast::Scene;
     #[pymodule_export]
-    use crate::refinement::{RangeNoise, SurfaceSample};
+    use crate::refinement::{RangeNoise, SurfaceSample, shot_words};
     #[pymodule_export]
     use crate::registration::{FixedView, Registration, register_window};
     #[pymodule_export]

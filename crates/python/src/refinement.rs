@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! `_core.SurfaceSample`: where along its beam each point of a map most probably is.
 
-use bentwing_refinement::{Noise, Sample, Settings};
-use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
+use bentwing_refinement::{N_WORDS, Noise, Sample, Settings, words_of};
+use numpy::{
+    IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods,
+};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 
-use crate::arrays::{finite, finite_number, finite_rows, require_rows, rows, same};
+use crate::arrays::{finite, finite_number, finite_rows, require_rows, rows, same, to_array2};
 use crate::errors::in_pool;
 
 /// The noise, moves and standard deviations.
@@ -41,50 +43,37 @@ pub(crate) struct SurfaceSample(Option<Sample>);
 #[pymethods]
 impl SurfaceSample {
     #[new]
-    #[pyo3(signature = (*, edge, n_levels, enough, fewest_passes, most_noise, pass_length))]
+    #[pyo3(signature = (*, edge, n_levels, enough, fewest_passes, most_noise))]
     fn new(
         edge: f64,
         n_levels: u32,
         enough: usize,
         fewest_passes: f64,
         most_noise: f64,
-        pass_length: f64,
     ) -> PyResult<Self> {
-        for (name, value) in [("edge", edge), ("pass_length", pass_length)] {
-            if finite_number(name, value)? <= 0.0 {
-                let message = format!("{name}: expected a positive number, got {value}");
-                return Err(PyValueError::new_err(message));
-            }
-        }
+        positive("edge", edge)?;
         Ok(Self(Some(Sample::new(Settings {
             edge,
             n_levels: n_levels.clamp(1, 8),
             enough: enough.max(1),
             fewest_passes: finite_number("fewest_passes", fewest_passes)?,
             most_noise: finite_number("most_noise", most_noise)?,
-            pass: pass_length,
         }))))
     }
 
-    /// Adds points with the unit directions, lengths and times of their beams, and whether each is to be
-    /// refined or only tells where others are.
-    #[pyo3(signature = (points, *, beams, ranges, times, own))]
+    /// Adds points as `shot_words` has them, and whether each is to be refined or only tells where others
+    /// are.
+    #[pyo3(signature = (words, *, own))]
     fn add(
         &mut self,
         py: Python<'_>,
-        points: PyReadonlyArray2<'_, f64>,
-        beams: PyReadonlyArray2<'_, f32>,
-        ranges: PyReadonlyArray1<'_, f32>,
-        times: PyReadonlyArray1<'_, f64>,
+        words: PyReadonlyArray2<'_, u32>,
         own: PyReadonlyArray1<'_, bool>,
     ) -> PyResult<()> {
-        let points = finite_rows("points", &points)?;
-        let n = points.len();
-        let (beams, ranges) = (rows("beams", &beams)?, same("ranges", &ranges, n)?);
-        require_rows("beams", beams.len(), n)?;
-        let (times, own) = (finite("times", &times, n)?, same("own", &own, n)?);
+        let words = rows::<_, N_WORDS>("words", &words)?;
+        let own = same("own", &own, words.len())?;
         let sample = self.0.as_mut().ok_or_else(used)?;
-        crate::errors::detached(py, || sample.add(points, beams, ranges, times, own));
+        crate::errors::detached(py, || sample.add(words, own));
         Ok(())
     }
 
@@ -106,6 +95,39 @@ impl SurfaceSample {
             (RangeNoise(f.noise), columns.0, columns.1)
         }))
     }
+}
+
+/// Points with the unit directions, lengths and times of their beams as a sample takes them, (N, 5).
+#[pyfunction]
+#[pyo3(signature = (points, *, beams, ranges, times, edge, pass_length))]
+pub(crate) fn shot_words<'py>(
+    py: Python<'py>,
+    points: PyReadonlyArray2<'py, f64>,
+    beams: PyReadonlyArray2<'py, f32>,
+    ranges: PyReadonlyArray1<'py, f32>,
+    times: PyReadonlyArray1<'py, f64>,
+    edge: f64,
+    pass_length: f64,
+) -> PyResult<Bound<'py, PyArray2<u32>>> {
+    let points = finite_rows("points", &points)?;
+    let n = points.len();
+    let (beams, ranges) = (rows("beams", &beams)?, same("ranges", &ranges, n)?);
+    require_rows("beams", beams.len(), n)?;
+    let times = finite("times", &times, n)?;
+    let sizes = (
+        positive("edge", edge)?,
+        positive("pass_length", pass_length)?,
+    );
+    let words = crate::errors::detached(py, || words_of(points, beams, ranges, times, sizes));
+    to_array2(py, &words)
+}
+
+fn positive(name: &str, value: f64) -> PyResult<f64> {
+    if finite_number(name, value)? > 0.0 {
+        return Ok(value);
+    }
+    let message = format!("{name}: expected a positive number, got {value}");
+    Err(PyValueError::new_err(message))
 }
 
 fn used() -> PyErr {

@@ -5,7 +5,6 @@ use rayon::prelude::*;
 
 /// Bits of a coordinate.
 const BITS: u32 = 21;
-const OFFSET: i64 = 1 << (BITS - 1);
 /// Rows of three cells around a cell, and cells.
 const N_ROWS: usize = 9;
 pub(crate) const N_AROUND: usize = 3 * N_ROWS;
@@ -16,8 +15,8 @@ pub(crate) const NONE: u32 = u32::MAX;
 
 /// The place of a finest cell on a curve along which the cells of every larger one lie together.
 #[inline]
-pub(crate) fn code_of(cell: [i64; 3]) -> u64 {
-    let [x, y, z] = cell.map(|c| spread(c.wrapping_add(OFFSET) as u64));
+pub(crate) fn code_of(cell: [u32; 3]) -> u64 {
+    let [x, y, z] = cell.map(|c| spread(u64::from(c)));
     x << 2 | y << 1 | z
 }
 
@@ -167,15 +166,15 @@ mod tests {
     proptest! {
         #[test]
         fn the_code_of_a_larger_cell_is_the_beginning_of_its_cells_codes(
-            cell in prop::array::uniform3(-OFFSET / 2..OFFSET / 2), level in 0..8_u32,
+            cell in prop::array::uniform3(0..1_u32 << BITS), level in 0..8_u32,
         ) {
             let above = cell.map(|c| c >> level << level);
             prop_assert_eq!(code_of(cell) >> (3 * level), code_of(above) >> (3 * level));
         }
 
         #[test]
-        fn a_code_keeps_the_coordinates(cell in prop::array::uniform3(-OFFSET..OFFSET)) {
-            let [x, y, z] = cell.map(|c| (c + OFFSET) as u64);
+        fn a_code_keeps_the_coordinates(cell in prop::array::uniform3(0..1_u32 << BITS)) {
+            let [x, y, z] = cell.map(u64::from);
             prop_assert_eq!(row_key(code_of(cell)), x << 42 | y << 21 | z);
         }
     }
@@ -184,13 +183,13 @@ mod tests {
     fn codes(edge: f64) -> Vec<u64> {
         let point = |i: i32| {
             [
-                f64::from(i % 7) * 0.3 - 1.0,
-                f64::from(i % 11) * 0.21 - 1.1,
-                f64::from(i) * 0.01 - 2.0,
+                f64::from(i % 7) * 0.3 + 1.0,
+                f64::from(i % 11) * 0.21 + 1.1,
+                f64::from(i) * 0.01 + 2.0,
             ]
         };
         let mut codes: Vec<u64> = (0..500)
-            .map(|i| code_of(point(i).map(|c| (c / edge).floor() as i64)))
+            .map(|i| code_of(point(i).map(|c| (c / edge) as u32)))
             .collect();
         codes.sort_unstable();
         codes

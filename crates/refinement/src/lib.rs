@@ -5,6 +5,7 @@
 mod grid;
 mod noise;
 mod piece;
+mod radix;
 mod refine;
 mod sample;
 mod sheet;
@@ -14,4 +15,4 @@ mod surfaces;
 
 pub use noise::Noise;
 pub use refine::Refined;
-pub use sample::{Sample, Settings};
+pub use sample::{N_WORDS, Sample, Settings, words_of};

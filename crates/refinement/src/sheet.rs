@@ -6,7 +6,7 @@ use bentwing_voxels::MIN_WIDTH;
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 use wide::f32x8;
 
-use crate::spots::{Block, Spots, add, total};
+use crate::spots::{LANES, NO_SPOT, Spot, add, total};
 
 /// Passes are told apart by so many bins.
 pub(crate) const N_PASSES: usize = 64;
@@ -61,6 +61,7 @@ pub(crate) struct Sheet {
 /// Spots in the axes of a sheet.
 #[derive(Clone, Copy, Debug)]
 struct Local {
+    pass: [u8; LANES],
     /// Along the surface, over the radius.
     u: f32x8,
     v: f32x8,
@@ -79,6 +80,13 @@ struct Local {
     residual: f32x8,
 }
 
+/// Room for what a sheet computes of its spots.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Room {
+    locals: Vec<Local>,
+    sizes: Vec<f32>,
+}
+
 /// What a sheet may be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
@@ -89,12 +97,17 @@ enum Kind {
 
 impl Sheet {
     /// The sheet through spots, if they have one; `normal` is a guess.
-    pub(crate) fn fit(spots: &Spots, radius: f64, normal: &Vector3<f64>) -> Option<Self> {
-        Self::fit_as(spots, radius, normal, Kind::Any)
+    pub(crate) fn fit(
+        spots: &[Spot],
+        radius: f64,
+        normal: &Vector3<f64>,
+        room: &mut Room,
+    ) -> Option<Self> {
+        Self::fit_as(spots, radius, normal, Kind::Any, room)
     }
 
     /// The same within a radius that a quadric can follow, where this one bends more.
-    pub(crate) fn narrower(&self, spots: &Spots) -> Option<Self> {
+    pub(crate) fn narrower(&self, spots: &[Spot], room: &mut Room) -> Option<Self> {
         let h = &self.heights;
         let bend = 0.5 * (h[3] - h[5]).hypot(h[4]) + 0.5 * (h[3] + h[5]).abs();
         let slope = 2.0 * bend / self.radius;
@@ -102,10 +115,16 @@ impl Sheet {
             return None;
         }
         let radius = self.radius * (STEEPEST / slope).max(NARROWEST);
-        Self::fit_as(spots, radius, &self.normal, Kind::Bent)
+        Self::fit_as(spots, radius, &self.normal, Kind::Bent, room)
     }
 
-    fn fit_as(spots: &Spots, radius: f64, normal: &Vector3<f64>, kind: Kind) -> Option<Self> {
+    fn fit_as(
+        spots: &[Spot],
+        radius: f64,
+        normal: &Vector3<f64>,
+        kind: Kind,
+        room: &mut Room,
+    ) -> Option<Self> {
         let mut sheet = Self {
             axes: frame(normal),
             heights: Vector6::zeros(),
@@ -120,13 +139,14 @@ impl Sheet {
             n_parameters: PLANE,
             scale: 1.0,
         };
-        let mut locals = sheet.locals(spots);
-        let mut sums = Sums::of(&locals);
+        let Room { locals, sizes } = room;
+        sheet.put(spots, locals);
+        let mut sums = Sums::of(locals);
         let first = sums.plane()?;
         if first.fixed_rows::<2>(1).norm() > STEEP * radius {
             sheet.turn(&first);
-            locals = sheet.locals(spots);
-            sums = Sums::of(&locals);
+            sheet.put(spots, locals);
+            sums = Sums::of(locals);
         }
         let mut robust = false;
         for round in 0.. {
@@ -134,35 +154,45 @@ impl Sheet {
                 return None;
             }
             sheet.choose(&sums, kind)?;
-            let largest = sheet.normalize(&mut locals);
+            let largest = sheet.normalize(locals);
             if round == ROUNDS || !robust && largest < CLEAN {
                 break;
             }
-            reweight(&mut locals, spots.len());
+            reweight(locals, spots.len(), sizes);
             robust = true;
-            sums = Sums::of(&locals);
+            sums = Sums::of(locals);
         }
         sheet.face();
         let variance = if robust { TUKEY_VARIANCE } else { 1.0 };
-        sheet.describe(spots, &locals, variance);
+        sheet.describe(locals, variance);
         Some(sheet)
     }
 
-    fn locals(&self, spots: &Spots) -> Vec<Local> {
+    /// Takes spots in the axes of the sheet.
+    fn put(&self, spots: &[Spot], locals: &mut Vec<Local>) {
         let per_metre = 1.0 / self.radius as f32;
         let axes = [0, 1, 2].map(|k| [0, 1, 2].map(|a| f32x8::splat(self.axes[(k, a)] as f32)));
         let along = |c: &[f32x8; 3]| axes.map(|row| row[0] * c[0] + row[1] * c[1] + row[2] * c[2]);
-        let local = |b: &Block| {
-            let ([u, v, height], beam) = (along(&b.at()), along(&b.beam()));
-            let (u, v, sigma) = (u * per_metre, v * per_metre, f32x8::from(b.sigma));
+        let local = |some: &[Spot]| {
+            let mut eight = [NO_SPOT; LANES];
+            eight[..some.len()].copy_from_slice(some);
+            let at = [0, 1, 2].map(|a| f32x8::new(eight.map(|s| s.at[a])));
+            let beam = [0, 1, 2].map(|a| f32x8::new(eight.map(|s| s.beam[a])));
+            let is = f32x8::new(std::array::from_fn(|k| f32::from(u8::from(k < some.len()))));
+            let ([u, v, height], beam) = (along(&at), along(&beam));
+            let (u, v, sigma) = (
+                u * per_metre,
+                v * per_metre,
+                f32x8::new(eight.map(|s| s.sigma)),
+            );
             // By the distance along the surface alone: by that across it, what the noise brings nearer to
             // the middle would count more, and draw the surface there.
             let near = (1.0 - u * u - v * v).fast_max(f32x8::ZERO);
-            let is = f32x8::from(b.is);
             let share = near * near * is;
             let across = beam[2].abs().fast_max(f32x8::splat(GRAZING)) * sigma;
             let variance = across * across;
             Local {
+                pass: eight.map(|s| s.pass),
                 u,
                 v,
                 height,
@@ -175,7 +205,8 @@ impl Sheet {
                 residual: f32x8::ZERO,
             }
         };
-        spots.blocks().iter().map(local).collect()
+        locals.clear();
+        locals.extend(spots.chunks(LANES).map(local));
     }
 
     /// Turns the axes to a plane.
@@ -213,10 +244,10 @@ impl Sheet {
         Some(())
     }
 
-    fn describe(&mut self, spots: &Spots, locals: &[Local], normal: f64) {
+    fn describe(&mut self, locals: &[Local], normal: f64) {
         let mut sums = [f32x8::ZERO; 6];
         let mut passes = [(0.0, 0.0); N_PASSES];
-        for (l, block) in locals.iter().zip(spots.blocks()) {
+        for l in locals {
             let squared = l.residual * l.residual;
             let share = l.weight * l.variance;
             let terms = [
@@ -229,7 +260,7 @@ impl Sheet {
             ];
             add(&mut sums, terms);
             let off = share * l.residual * l.variance.sqrt();
-            for (pass, (share, off)) in block
+            for (pass, (share, off)) in l
                 .pass
                 .iter()
                 .zip(share.to_array().iter().zip(off.to_array()))
@@ -285,12 +316,12 @@ impl Sheet {
     }
 
     /// What each spot costs: its residual squared, at most that of one that counts no more.
-    pub(crate) fn costs(&self, spots: &Spots) -> Vec<f32> {
-        let mut locals = self.locals(spots);
-        self.normalize(&mut locals);
+    pub(crate) fn costs(&self, spots: &[Spot], room: &mut Room) -> Vec<f32> {
+        self.put(spots, &mut room.locals);
+        self.normalize(&mut room.locals);
         let cost = |r: f32| (r * r).min(REJECTED * REJECTED);
+        let locals = room.locals.iter();
         let mut costs: Vec<f32> = locals
-            .iter()
             .flat_map(|l| l.residual.to_array().map(cost))
             .collect();
         costs.truncate(spots.len());
@@ -304,11 +335,11 @@ impl Sheet {
 }
 
 /// Tukey's weights by the residuals of the first `n` spots.
-fn reweight(locals: &mut [Local], n: usize) {
-    let mut sizes: Vec<f32> = locals
-        .iter()
-        .flat_map(|l| l.residual.abs().to_array())
-        .collect();
+fn reweight(locals: &mut [Local], n: usize, sizes: &mut Vec<f32>) {
+    sizes.clear();
+    for l in &*locals {
+        sizes.extend(l.residual.abs().to_array());
+    }
     sizes.truncate(n);
     let median = *sizes.select_nth_unstable_by(n / 2, f32::total_cmp).1;
     let per_scale = 1.0 / (REJECTED * (MAD_TO_STD * median).max(1.0));

@@ -7,8 +7,8 @@ use bentwing_trajectory::so3;
 use nalgebra::Vector3;
 use wide::f32x4;
 
-use crate::sheet::{GRAZING, Sheet};
-use crate::spots::{Spot, Spots, dot, single};
+use crate::sheet::{GRAZING, Room, Sheet};
+use crate::spots::{Spot, dot, normal_of, partition, single};
 
 const N_DIRECTIONS: usize = 6;
 const N_BINS: usize = 10;
@@ -54,18 +54,19 @@ pub(crate) type Pair = [(Sheet, Half); 2];
 
 /// The two sheets that explain the spots better than `one` does, if any do.
 pub(crate) fn split(
-    spots: &Spots,
+    spots: &mut [Spot],
     radius: f64,
     normal: &Vector3<f64>,
     one: Option<&Sheet>,
+    room: &mut Room,
 ) -> Option<Pair> {
     let coarse = best_line(spots, radius, normal)?;
-    let pair = fit_halves(spots, radius, coarse)?;
-    let lines = [crease(&pair), step(spots, radius, &pair, normal)];
+    let pair = fit_halves(spots, radius, coarse, room)?;
+    let lines = [crease(&pair), step(spots, radius, &pair, normal, room)];
     let others = lines
         .into_iter()
         .flatten()
-        .filter_map(|line| fit_halves(spots, radius, line));
+        .filter_map(|line| fit_halves(spots, radius, line, room));
     let pair = others.fold(pair, |best, other| {
         if cost(&other) < cost(&best) {
             other
@@ -90,33 +91,36 @@ fn is_better(pair: &Pair, one: Option<&Sheet>) -> bool {
     (one.cost - cost(pair)) / left > price
 }
 
-fn fit_halves(spots: &Spots, radius: f64, half: Half) -> Option<Pair> {
-    let [a, b] = spots.partition(|s| half.holds(&s.at));
+fn fit_halves(spots: &mut [Spot], radius: f64, half: Half, room: &mut Room) -> Option<Pair> {
+    let [a, b] = partition(spots, |s| half.holds(&s.at));
     if a.len() < FEWEST || b.len() < FEWEST {
         return None;
     }
-    let fit = |part: &Spots| Sheet::fit(part, radius, &part.normal()?);
-    Some([(fit(&a)?, half), (fit(&b)?, half.other())])
+    let mut fit = |part: &[Spot]| Sheet::fit(part, radius, &normal_of(part)?, room);
+    Some([(fit(a)?, half), (fit(b)?, half.other())])
 }
 
 /// The line that leaves two planes with the least squares, unless even they explain the spots hardly better
 /// than one does.
-fn best_line(spots: &Spots, radius: f64, normal: &Vector3<f64>) -> Option<Half> {
+fn best_line(spots: &[Spot], radius: f64, normal: &Vector3<f64>) -> Option<Half> {
     let [u, v] = so3::orthogonal_pair(normal);
     let [along, beside, up] = [u / radius, v / radius, *normal].map(|axis| single(&axis));
     // In small squares first, of which each side of a line has some.
     let mut squares = [Sums::default(); N_BINS * N_BINS];
-    for s in spots.iter() {
+    for s in spots {
         let (p, q) = (dot(&along, &s.at), dot(&beside, &s.at));
-        squares[bin_of::<N_BINS>(p) * N_BINS + bin_of::<N_BINS>(q)].add(p, q, &s, &up);
+        squares[bin_of::<N_BINS>(p) * N_BINS + bin_of::<N_BINS>(q)].add(p, q, s, &up);
     }
-    let all = squares.iter().fold(Sums::default(), |sum, b| sum.plus(b));
+    let filled = squares.iter().enumerate().filter(|(_, s)| s.w() > 0.0);
+    let filled: Vec<([f32; 2], Sums)> = filled
+        .map(|(i, sums)| ([i / N_BINS, i % N_BINS].map(middle_of), *sums))
+        .collect();
+    let all = filled.iter().fold(Sums::default(), |sum, s| sum.plus(&s.1));
     let mut best: Option<(f64, Half)> = None;
     for k in 0..N_DIRECTIONS {
         let (sin, cos) = (PI * k as f64 / N_DIRECTIONS as f64).sin_cos();
         let mut bins = [Sums::default(); N_BINS];
-        for (i, sums) in squares.iter().enumerate().filter(|(_, s)| s.w() > 0.0) {
-            let [p, q] = [i / N_BINS, i % N_BINS].map(middle_of);
+        for ([p, q], sums) in &filled {
             let bin = &mut bins[bin_of::<N_BINS>(cos as f32 * p + sin as f32 * q)];
             *bin = bin.plus(sums);
         }
@@ -155,9 +159,15 @@ fn middle_of(bin: usize) -> f32 {
 }
 
 /// The line of a step between two sheets, which leaves each spot on the one that it fits.
-fn step(spots: &Spots, radius: f64, pair: &Pair, normal: &Vector3<f64>) -> Option<Half> {
+fn step(
+    spots: &[Spot],
+    radius: f64,
+    pair: &Pair,
+    normal: &Vector3<f64>,
+    room: &mut Room,
+) -> Option<Half> {
     let (a, b) = (&pair[0].0, &pair[1].0);
-    let (of_a, of_b) = (a.costs(spots), b.costs(spots));
+    let (of_a, of_b) = (a.costs(spots, room), b.costs(spots, room));
     let nearer: Vec<f32> = of_a.iter().zip(of_b).map(|(x, y)| x - y).collect();
     let across = normal.cross(&pair[0].1.direction);
     let mut best: Option<(f32, Half)> = None;
@@ -241,7 +251,8 @@ impl Sums {
     /// Squares of the heights over the best plane, over their variances.
     fn misfit(&self) -> f64 {
         let w = self.w();
-        let per_weight = |k: usize| self.0[k].to_array().map(|s| f64::from(s) / w);
+        let per = 1.0 / w;
+        let per_weight = |k: usize| self.0[k].to_array().map(|s| f64::from(s) * per);
         let ([_, _, u, v], [h, uu, uv, vv], [uh, vh, hh, _]) =
             (per_weight(0), per_weight(1), per_weight(2));
         let (uu, uv, vv) = (uu - u * u, uv - u * v, vv - v * v);

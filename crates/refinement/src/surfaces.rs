@@ -9,10 +9,10 @@ use rayon::prelude::*;
 use crate::grid::{Level, N_AROUND, NONE, beside};
 use crate::noise::Noise;
 use crate::piece::Piece;
-use crate::sample::Sorted;
-use crate::sheet::Sheet;
+use crate::sample::{Shot, Sorted};
+use crate::sheet::{Room, Sheet};
 use crate::split::{Half, split};
-use crate::spots::{Spot, Spots, dot, single};
+use crate::spots::{NO_SPOT, Spot, dot, normal_of, partition, single};
 
 /// Points around a middle are used up to so many edges away, with less and less weight.
 const REACH: f64 = 1.5;
@@ -29,6 +29,21 @@ const NOISE_COSINE: f32 = 0.5;
 const CHUNK: usize = 64;
 /// Residuals beyond this many standard deviations of what noise alone would make show a second sheet.
 const SUSPICIOUS: f64 = 1.5;
+
+/// Where a task puts the spots of one cell after the other.
+struct Bench {
+    spots: [Spot; MOST_SPOTS],
+    room: Room,
+}
+
+impl Default for Bench {
+    fn default() -> Self {
+        Self {
+            spots: [NO_SPOT; MOST_SPOTS],
+            room: Room::default(),
+        }
+    }
+}
 
 /// The sheets of the cells of one size.
 #[derive(Clone, Debug)]
@@ -95,11 +110,11 @@ pub(crate) fn layers_of(sorted: &Sorted, noise: &Noise) -> Vec<Layer> {
             .collect();
         let found: Vec<Vec<Found>> = cells
             .par_chunks(CHUNK)
-            .map_init(Spots::default, |spots, places| {
+            .map_init(Bench::default, |bench, places| {
                 let mut around = level.around(places[0]);
                 let of_cell = |&place: &usize| {
                     let (number, around) = (level.in_rows(place), around.of(place));
-                    let pieces = pieces_of(sorted, level, number, &around, noise, spots);
+                    let pieces = pieces_of(sorted, level, number, &around, noise, bench);
                     let beside = beside(&around);
                     (!pieces.is_empty()).then_some(Found {
                         number,
@@ -151,8 +166,8 @@ pub(crate) fn noise_of(sorted: &Sorted) -> Option<Noise> {
         let of_level: Vec<Option<(u8, f64)>> = places
             .par_iter()
             .with_min_len(CHUNK)
-            .map_init(Spots::default, |spots, &place| {
-                residual(sorted, level, place, spots)
+            .map_init(Bench::default, |bench, &place| {
+                residual(sorted, level, place, bench)
             })
             .collect();
         found.extend(of_level.into_iter().flatten());
@@ -161,17 +176,18 @@ pub(crate) fn noise_of(sorted: &Sorted) -> Option<Noise> {
 }
 
 /// Step of the range of a cell's points and the standard deviation of their residuals along the beams.
-fn residual(sorted: &Sorted, level: &Level, place: usize, spots: &mut Spots) -> Option<(u8, f64)> {
+fn residual(sorted: &Sorted, level: &Level, place: usize, bench: &mut Bench) -> Option<(u8, f64)> {
     let cell = level.in_rows(place);
     let around = level.around(place).of(place);
-    let (_, radius) = gather(sorted, level, cell, &around, None, spots)?;
-    let normal = spots.normal()?;
+    let (_, radius, n) = gather(sorted, level, cell, &around, None, &mut bench.spots)?;
+    let spots = &mut bench.spots[..n];
+    let normal = normal_of(spots)?;
     let row = single(&normal);
-    let [steep, _] = spots.partition(|s| dot(&row, &s.beam) < -NOISE_COSINE);
+    let [steep, _] = partition(spots, |s| dot(&row, &s.beam) < -NOISE_COSINE);
     if steep.len() < sorted.settings.enough / 2 {
         return None;
     }
-    let sheet = Sheet::fit(&steep, radius, &normal)?;
+    let sheet = Sheet::fit(steep, radius, &normal, &mut bench.room)?;
     let own = level.points(cell);
     let step = sorted.shots[own.start + own.len() / 2].step;
     (sheet.n_passes >= sorted.settings.fewest_passes).then_some((step, sheet.scale.sqrt() * UNIT))
@@ -180,27 +196,25 @@ fn residual(sorted: &Sorted, level: &Level, place: usize, spots: &mut Spots) -> 
 /// Of a range where the noise is not known, m.
 const UNIT: f64 = 0.002;
 
-/// The points around the middle of a cell's points; the middle, and the radius within which they are.
+/// The points around the middle of a cell's points; the middle (units of the map), and the radius (m) within
+/// which they are, and their number.
 fn gather(
     sorted: &Sorted,
     level: &Level,
     cell: u32,
     around: &[u32; N_AROUND],
     noise: Option<&Noise>,
-    spots: &mut Spots,
-) -> Option<(Vector3<f64>, f64)> {
+    spots: &mut [Spot; MOST_SPOTS],
+) -> Option<([i32; 3], f64, usize)> {
     let around = around.iter().filter(|&&c| c != NONE);
     let total: usize = around.clone().map(|&c| level.points(c).len()).sum();
     if total < sorted.settings.enough {
         return None;
     }
-    let own = level.points(cell);
-    let n_own = own.len() as f64;
-    let place = |i: usize| Vector3::from(sorted.shots[i].at.map(f64::from));
-    let middle = own.fold(Vector3::zeros(), |sum, i| sum + place(i)) / n_own;
-    let (from, radius) = (single(&middle), REACH * level.edge);
+    let middle = middle_of(&sorted.shots[level.points(cell)]);
+    let (unit, radius) = (sorted.unit(), REACH * level.edge);
     let most = (radius * radius) as f32;
-    spots.clear();
+    let mut n = 0;
     let every = total.div_ceil(MOST_SPOTS);
     let mut skipped = 0;
     for &cell in around {
@@ -210,20 +224,29 @@ fn gather(
             .skip(skipped)
             .step_by(every)
         {
-            let at = [0, 1, 2].map(|a| shot.at[a] - from[a]);
-            if dot(&at, &at) < most {
-                spots.push(&Spot {
-                    at,
-                    beam: shot.beam,
-                    sigma: noise.map_or(UNIT, |n| n.of_step(shot.step)) as f32,
-                    pass: shot.pass,
-                });
-            }
+            let at = shot.from(&middle).map(|c| c * unit);
+            spots[n] = Spot {
+                at,
+                beam: shot.beam(),
+                sigma: noise.map_or(UNIT, |n| n.of_step(shot.step)) as f32,
+                pass: shot.pass,
+            };
+            // Whether it is near is as good as random: a branch would be guessed wrong.
+            n += usize::from(dot(&at, &at) < most);
         }
         // As if the points of all cells were one behind the other.
         skipped = (skipped + every - points.len() % every) % every;
     }
-    (spots.len() * every.min(2) >= sorted.settings.enough / 2).then_some((middle, radius))
+    (n * every.min(2) >= sorted.settings.enough / 2).then_some((middle, radius, n))
+}
+
+/// Of some shots, at least one.
+fn middle_of(shots: &[Shot]) -> [i32; 3] {
+    let first = shots[0].at;
+    let sum = shots.iter().fold([0_i64; 3], |sum, shot| {
+        [0, 1, 2].map(|a| sum[a] + i64::from(shot.at[a].wrapping_sub(first[a])))
+    });
+    [0, 1, 2].map(|a| first[a].wrapping_add((sum[a] / shots.len() as i64) as i32))
 }
 
 fn pieces_of(
@@ -232,46 +255,51 @@ fn pieces_of(
     cell: u32,
     around: &[u32; N_AROUND],
     noise: &Noise,
-    spots: &mut Spots,
+    bench: &mut Bench,
 ) -> Vec<Piece> {
-    let Some((middle, radius)) = gather(sorted, level, cell, around, Some(noise), spots) else {
+    let Bench { spots, room } = bench;
+    let Some((middle, radius, n)) = gather(sorted, level, cell, around, Some(noise), spots) else {
         return Vec::new();
     };
-    let Some(normal) = spots.normal() else {
+    let Some(normal) = normal_of(&spots[..n]) else {
         return Vec::new();
     };
     // Those that beams meet from behind are of another side.
     let row = single(&normal);
-    let is_front = |s: &Spot| dot(&row, &s.beam) <= 0.0;
-    let sides = spots.partition(is_front);
+    let sides = partition(&mut spots[..n], |s| dot(&row, &s.beam) <= 0.0);
     let mut pieces = Vec::new();
-    for side in &sides {
-        if side.len() < FEWEST_SPOTS {
-            continue;
-        }
-        for (sheet, half) in sheets_of(side, radius) {
+    for side in sides.into_iter().filter(|side| side.len() >= FEWEST_SPOTS) {
+        let own = if side.len() == n {
+            Some(normal)
+        } else {
+            normal_of(side)
+        };
+        for (sheet, half) in own.map_or(Vec::new(), |normal| sheets_of(side, radius, &normal, room))
+        {
             if sheet.n_passes >= sorted.settings.fewest_passes
                 && sheet.n_points >= FEWEST_SPOTS as f64
             {
-                pieces.push(Piece::of(&middle, &sheet, half.as_ref()));
+                pieces.push(Piece::of(middle, &sheet, half.as_ref()));
             }
         }
     }
     pieces
 }
 
-/// One sheet, or two where that is more likely.
-fn sheets_of(spots: &Spots, radius: f64) -> Vec<(Sheet, Option<Half>)> {
-    let Some(normal) = spots.normal() else {
-        return Vec::new();
-    };
-    let one = Sheet::fit(spots, radius, &normal);
+/// One sheet, or two where that is more likely; `normal` is a guess.
+fn sheets_of(
+    spots: &mut [Spot],
+    radius: f64,
+    normal: &Vector3<f64>,
+    room: &mut Room,
+) -> Vec<(Sheet, Option<Half>)> {
+    let one = Sheet::fit(spots, radius, normal, room);
     if one.as_ref().is_none_or(is_suspicious)
-        && let Some(pair) = split(spots, radius, &normal, one.as_ref())
+        && let Some(pair) = split(spots, radius, normal, one.as_ref(), room)
     {
         return pair.map(|(sheet, half)| (sheet, Some(half))).to_vec();
     }
-    let one = one.map(|sheet| sheet.narrower(spots).unwrap_or(sheet));
+    let one = one.map(|sheet| sheet.narrower(spots, room).unwrap_or(sheet));
     one.map(|sheet| (sheet, None)).into_iter().collect()
 }
 

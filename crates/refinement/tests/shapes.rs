@@ -5,7 +5,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use bentwing_refinement::{Refined, Sample, Settings};
+use bentwing_refinement::{N_WORDS, Refined, Sample, Settings, words_of};
 
 const SETTINGS: Settings = Settings {
     edge: 0.05,
@@ -13,8 +13,8 @@ const SETTINGS: Settings = Settings {
     enough: 80,
     fewest_passes: 5.0,
     most_noise: 0.03,
-    pass: 0.25,
 };
+const PASS: f64 = 0.25;
 const NOISE: f64 = 0.01;
 const DURATION: f64 = 30.0;
 
@@ -65,10 +65,15 @@ impl Map {
         self.times.push(time);
     }
 
+    fn words(&self) -> Vec<[u32; N_WORDS]> {
+        let sizes = (SETTINGS.edge, PASS);
+        words_of(&self.points, &self.beams, &self.ranges, &self.times, sizes)
+    }
+
     fn refine(&self) -> Refined {
         let mut sample = Sample::new(SETTINGS);
         let own = vec![true; self.points.len()];
-        sample.add(&self.points, &self.beams, &self.ranges, &self.times, &own);
+        sample.add(&self.words(), &own);
         sample.refine(None).unwrap()
     }
 
@@ -365,7 +370,7 @@ fn what_the_passes_share_stays_in_the_stated_deviation() {
             truth,
             from,
             time,
-            biases[(time / 0.25) as usize],
+            biases[(time / PASS) as usize],
         );
     }
     let sigmas = map.refine().sigmas;
@@ -380,7 +385,7 @@ fn points_around_help_as_much_as_if_they_were_refined_too() {
     let all = map.refine();
     let own: Vec<bool> = map.points.iter().map(|p| p[0] < 0.1).collect();
     let mut sample = Sample::new(SETTINGS);
-    sample.add(&map.points, &map.beams, &map.ranges, &map.times, &own);
+    sample.add(&map.words(), &own);
     let found = sample.refine(Some(all.noise.clone())).unwrap();
     let expected: Vec<f32> = (0..own.len())
         .filter(|&i| own[i])

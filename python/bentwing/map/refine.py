@@ -32,7 +32,7 @@ MOST_NOISE = 0.03  # m, of a range; what looks noisier is the shape of things
 # s; what is measured within it shares the error of the trajectory. A head that turns sees a surface in it
 # once.
 PASS_LENGTH = 0.25
-MOST_POINTS = 4_000_000  # that are looked at together, about 100 bytes each
+MOST_POINTS = 5_000_000  # that are looked at together, about 75 bytes each
 _HELD = 32_000_000  # bytes of moves that need no file
 _PARTS_AHEAD = 8  # chosen while those before them go to the disk
 _NEEDED = ("points", "beams", "ranges", "times")
@@ -56,7 +56,7 @@ def refine(
     Parameters
     ----------
     chunks : with the beams of their points and the ranges as measured
-    folder : of the temporary files, about 150 bytes per point
+    folder : of the temporary files, about 100 bytes per point
     counts : receives `map.refined`, the points that were moved
     record : receives `moved`, the share, and its medians `move`, `sigma_before` and `sigma`, m
     threads : default: all cores
@@ -113,9 +113,10 @@ def _parts(
     spool: ArraySpool, slabs: Slabs
 ) -> Generator[tuple[int, dict[str, NDArray[Any]]], None, None]:
     for columns in spool.tables():
+        needed = {name: columns[name] for name in _NEEDED}
+        words = _core.shot_words(**needed, edge=EDGE, pass_length=PASS_LENGTH)
         for part in slabs.parts(columns["points"]):
-            chosen = {name: columns[name].take(part.rows, axis=0) for name in _NEEDED}
-            yield part.number, {**chosen, "own": part.own}
+            yield part.number, {"words": words.take(part.rows, axis=0), "own": part.own}
 
 
 def _sample(group: ArraySpool) -> _core.SurfaceSample:
@@ -125,7 +126,6 @@ def _sample(group: ArraySpool) -> _core.SurfaceSample:
         enough=ENOUGH,
         fewest_passes=FEWEST_PASSES,
         most_noise=MOST_NOISE,
-        pass_length=PASS_LENGTH,
     )
     for columns in group.tables():
         sample.add(**columns)

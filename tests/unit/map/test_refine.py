@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
 import functools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -92,6 +93,14 @@ def test_the_number_of_threads_changes_no_byte(tmp_path):
         assert a.sigma.tobytes() == b.sigma.tobytes()
 
 
+@pytest.mark.parametrize("far", [26_214.4, -40_000.0])
+def test_a_map_far_from_its_origin_is_refined_as_well(tmp_path, far):
+    # Places in the map are whole numbers that begin anew every 52.4 km.
+    chunks = [replace(c, points=c.points + np.array([far, -far, 0.0])) for c in recording()]
+    found = refined(tmp_path, chunks)
+    assert heights(found).std() < 0.35 * heights(recording()).std()
+
+
 def test_few_points_stay_where_they_are(tmp_path):
     few = recording()[0].where(slice(0, 50))
     record = {}
@@ -121,16 +130,16 @@ def test_beams_are_needed(tmp_path):
 
 
 def test_a_sample_is_used_once():
-    chunk = recording()[0]
-    sample = _core.SurfaceSample(
-        edge=0.05, n_levels=4, enough=80, fewest_passes=5.0, most_noise=0.03, pass_length=0.5
-    )
-    own = np.ones(len(chunk), np.bool_)
-    sample.add(chunk.points, beams=chunk.beams, ranges=chunk.ranges, times=chunk.times, own=own)
+    chunk, lengths = recording()[0], {"edge": 0.05, "pass_length": 0.5}
+    beams = {"beams": chunk.beams, "ranges": chunk.ranges, "times": chunk.times}
+    words = _core.shot_words(chunk.points, **beams, **lengths)
+    sizes = {"n_levels": 4, "enough": 80, "fewest_passes": 5.0, "most_noise": 0.03}
+    sample = _core.SurfaceSample(edge=0.05, **sizes)
+    sample.add(words, own=np.ones(len(chunk), np.bool_))
     sample.refine()
     with pytest.raises(RuntimeError, match="used up"):
         sample.refine()
     with pytest.raises(ValueError, match="edge: expected a positive number"):
-        _core.SurfaceSample(
-            edge=0.0, n_levels=4, enough=80, fewest_passes=5.0, most_noise=0.03, pass_length=0.5
-        )
+        _core.SurfaceSample(edge=0.0, **sizes)
+    with pytest.raises(ValueError, match="pass_length: expected a positive number"):
+        _core.shot_words(chunk.points, **beams, edge=0.05, pass_length=0.0)

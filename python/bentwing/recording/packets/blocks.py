@@ -8,11 +8,12 @@ how its packets are laid out, and where and when each channel looks. `hesai` and
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bentwing.base.value import Value
+from bentwing.recording.attributes import NO_ATTRIBUTES
 from bentwing.recording.batches import LidarBatch
 
 if TYPE_CHECKING:
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
+
+    from bentwing.recording.attributes import Attributes
 
 TURN = 36000  # hundredths of a degree
 MAX_STEP = 200  # between firings; 20 turns per second of the slowest block are 120
@@ -70,8 +73,17 @@ class BlockPackets:
 
     period_ns: int | None = None
 
-    def __init__(self, model: BlockModel) -> None:
+    def __init__(
+        self,
+        model: BlockModel,
+        *,
+        attributes: Attributes = NO_ATTRIBUTES,  # noqa: ARG002 - there are none, see `fields`
+    ) -> None:
         self._model = model
+
+    def fields(self, packet: bytes) -> dict[str, np.dtype[Any]]:  # noqa: ARG002 - of no packet
+        """Return the further fields that a map can carry: none."""
+        return {}
 
     def stamp_ns(self, packet: bytes) -> int | None:
         """Return the sensor's time of the first firing in ns; None for no such packet."""

@@ -39,7 +39,8 @@ def lever_covariance(trajectory: Trajectory, imu: Imu | None) -> Array:
     n = int((trajectory.times[-1] - trajectory.times[0]) / _STEP)
     if imu is None or n < 4:
         return np.zeros((3, 3))
-    times = trajectory.times[0] + _STEP * np.arange(n + 1)
+    # The last of whole steps may be rounded beyond the end.
+    times = np.minimum(trajectory.times[0] + _STEP * np.arange(n + 1), trajectory.times[-1])
     positions, quats = trajectory.interpolate(times)
     turned = geometry.log(geometry.multiply(geometry.inverse(quats[:-1]), quats[1:])) / _STEP
     rates, accelerations = 0.5 * (turned[1:] + turned[:-1]), np.diff(turned, axis=0) / _STEP

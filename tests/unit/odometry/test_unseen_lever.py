@@ -82,3 +82,13 @@ def test_the_imu_is_elsewhere_and_the_lidar_is_not():
         "extrinsic_translation": pytest.approx([0.001, 0.002, 0.005])
     }
     assert with_lever({"latency": [0.1]}, lever) == {"latency": [0.1]}
+
+
+@pytest.mark.parametrize("first", [0.0, 0.02, 0.1, 3.3])
+def test_a_path_ends_wherever_it_does(first):
+    """Whole steps from the start may be rounded to a little more than the end."""
+    still = np.zeros((2, 3))
+    for last in first + 0.05 * np.arange(4, 1200, 7):
+        times = np.array([first, round(last, 2)])
+        path = Trajectory(times, still, np.tile([0.0, 0.0, 0.0, 1.0], (2, 1)))
+        assert np.allclose(lever_covariance(path, IMU), 0.0)

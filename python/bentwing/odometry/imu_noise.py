@@ -23,8 +23,8 @@ _FOURTH = np.sqrt(70.0)
 _RIGHT = 1.5
 GYRO_FLOOR, ACCEL_FLOOR = 5e-4, 0.01
 """rad/s/√Hz and m/s²/√Hz, that any carrier has: what it does beyond the noise is more than that."""
-# Fewer samples, s, do not tell.
-_ENOUGH = 1.0
+# Fewer samples do not tell, nor what they cover in less time, s; what a gap between them covers does not count.
+_FEWEST, _ENOUGH = 16, 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +76,8 @@ class BelievedNoise:
         ----------
         settled : whether a motion has lasted for so long that its vibration is known
         """
-        if len(imu.times) < 2 or np.ptp(imu.times) < _ENOUGH:
+        n = len(imu.times)
+        if n < _FEWEST or n * float(np.median(np.diff(imu.times))) < _ENOUGH:
             return self
         shown = ImuNoise.of(imu)
         most = ImuNoise(

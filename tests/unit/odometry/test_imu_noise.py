@@ -55,3 +55,11 @@ def test_less_than_a_second_says_nothing():
     stated = ImuNoise(0.1 * TRUE.gyro, 0.1 * TRUE.accel)
     found = BelievedNoise.as_stated(stated).after(samples(TRUE, seconds=0.5), settled=True)
     assert found.now == stated
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("kept", [slice(0, 3), np.r_[0:8, 300:308], slice(None, None, 100)])
+def test_few_samples_say_nothing_however_far_they_reach(kept):
+    all_of_them = samples(ImuNoise(5.0 * TRUE.gyro, TRUE.accel))
+    few = ImuBatch(*(getattr(all_of_them, name)[kept] for name in ("times", "gyro", "accel")))
+    assert BelievedNoise.as_stated(TRUE).after(few, settled=True).now == TRUE

@@ -28,6 +28,7 @@ TURN = 36000  # hundredths of a degree
 MAX_STEP = 200  # between firings; 20 turns per second of the slowest block are 120
 US = 1e-6
 BEGIN = 0xEEFF  # of a block: FF EE as a little-endian number
+DATE = [(name, "u1") for name in ("year", "month", "day", "hour", "minute", "second")]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -116,12 +117,7 @@ class BlockPackets:
             self._of_mode(table["blocks"][n_returns == n], times[n_returns == n], n, counts)
             for n in np.unique(n_returns).tolist()
         ]
-        batch = LidarBatch(
-            np.concatenate([one.points for one in found]),
-            np.concatenate([one.times for one in found]),
-            np.concatenate([one.intensity for one in found if one.intensity is not None]),
-            np.concatenate([one.ring for one in found if one.ring is not None]),
-        )
+        batch = LidarBatch.joined(found)
         return batch.where(np.argsort(batch.times, kind="stable"))
 
     def _of_mode(

@@ -18,7 +18,7 @@ import numpy as np
 
 from bentwing.base.errors import PayloadError, RecordingError
 from bentwing.base.regular_file import require_regular
-from bentwing.recording.packets.blocks import BlockModel
+from bentwing.recording.packets.blocks import DATE, BlockModel
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -65,20 +65,12 @@ QT_FIRING_US = (
     128.22, 130.28, 132.34, 134.39, 136.45,
 )  # fmt: skip
 
-_DATE = [
-    ("year", "u1"),
-    ("month", "u1"),
-    ("day", "u1"),
-    ("hour", "u1"),
-    ("minute", "u1"),
-    ("second", "u1"),
-]
 _CHANNEL = [("distance", "<u2"), ("intensity", "u1"), ("confidence", "u1")]
 _XT_TAIL = [
-    ("status", "V10"), ("mode", "u1"), ("speed", "<u2"), ("date", _DATE), ("us", "<u4"), ("factory", "u1"),
+    ("status", "V10"), ("mode", "u1"), ("speed", "<u2"), ("date", DATE), ("us", "<u4"), ("factory", "u1"),
 ]  # fmt: skip
 _QT_TAIL = [
-    ("status", "V10"), ("speed", "<u2"), ("us", "<u4"), ("mode", "u1"), ("factory", "u1"), ("date", _DATE),
+    ("status", "V10"), ("speed", "<u2"), ("us", "<u4"), ("mode", "u1"), ("factory", "u1"), ("date", DATE),
 ]  # fmt: skip
 
 
@@ -96,7 +88,7 @@ _P40 = np.dtype(
             [("begin", "<u2"), ("azimuth", "<u2"), ("channels", _CHANNEL[:2], (40,))],
             (10,),
         ),
-        ("status", "V8"), ("speed", "<u2"), ("us", "<u4"), ("mode", "u1"), ("factory", "u1"), ("date", _DATE),
+        ("status", "V8"), ("speed", "<u2"), ("us", "<u4"), ("mode", "u1"), ("factory", "u1"), ("date", DATE),
     ]
 )  # fmt: skip
 

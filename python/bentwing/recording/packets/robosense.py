@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bentwing.base.errors import RecordingError
-from bentwing.recording.packets.blocks import BlockModel
+from bentwing.recording.packets.blocks import DATE, BlockModel
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -41,17 +41,9 @@ _HELIOS_US = tuple(1.73 * i for i in range(32))
 
 _CHANNEL = [("distance", ">u2"), ("intensity", "u1")]
 _BLOCK = [("begin", "<u2"), ("azimuth", ">u2"), ("channels", _CHANNEL, (32,))]
-_DATE = [
-    ("year", "u1"),
-    ("month", "u1"),
-    ("day", "u1"),
-    ("hour", "u1"),
-    ("minute", "u1"),
-    ("second", "u1"),
-]
 _V1 = np.dtype(
     [
-        ("head", "V20"), ("date", _DATE), ("ms", ">u2"), ("us", ">u2"), ("rest", "V12"),
+        ("head", "V20"), ("date", DATE), ("ms", ">u2"), ("us", ">u2"), ("rest", "V12"),
         ("blocks", _BLOCK, (12,)), ("tail", "V6"),
     ]
 )  # fmt: skip

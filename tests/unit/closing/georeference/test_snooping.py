@@ -51,9 +51,8 @@ def test_a_mark_that_is_wrong_by_a_decimetre_is_named_alone(wrong):
             assert all(one.number == wrong and one.is_certain for one in found)
             named += len(found)
             assert all(one.off == pytest.approx(0.1, abs=0.05) for one in found)
-    assert (
-        named >= 29
-    )  # of 30: seen to a centimetre, a decimetre is ten standard deviations and less
+    # Of 30: seen to a centimetre, a decimetre is ten standard deviations and less.
+    assert named >= 29
 
 
 def test_good_marks_are_hardly_ever_doubted():

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     Axes = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 ALONG = 0.9  # cosine between the normal of the scans and an axis of the IMU that is about the same
+SAME_TURN = 0.2  # rad between mounts that are about the same
 _POINT = (
     "either the lidar is mounted with half a turn about the normal of its scan plane, or all axes of the "
     "accelerometer are negated; a 2D lidar sees both alike: turn T_imu_lidar, or write imu: "
@@ -54,6 +55,17 @@ def both_meanings(
         f"either {_told(gyro, accel)}, or {_told(*other)}; a 2D lidar sees both alike: write imu: "
         f"{_line(gyro, accel)}, or imu: {_line(*other)}"
     )
+
+
+def turned_or_negated(found: NDArray[np.float64], described: NDArray[np.float64]) -> str | None:
+    """Say what a mount that fits may mean, if as described it is one with which all is mirrored.
+
+    Parameters
+    ----------
+    found, described : (3, 3) rotations of the lidar in the IMU
+    """
+    half_turn = np.diag([-1.0, -1.0, 1.0])
+    return _POINT if axes.angle_between(described @ half_turn, found) < SAME_TURN else None
 
 
 def _mirrored(

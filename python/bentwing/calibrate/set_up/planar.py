@@ -16,7 +16,7 @@ from bentwing.calibrate.set_up import axes, edits
 from bentwing.calibrate.set_up.crossings import Crossings, Reading
 from bentwing.calibrate.set_up.delays import likely_delays
 from bentwing.calibrate.set_up.errors import NotFoundError
-from bentwing.calibrate.set_up.mirrors import both_meanings
+from bentwing.calibrate.set_up.mirrors import both_meanings, turned_or_negated
 from bentwing.calibrate.set_up.scans import Scans
 from bentwing.calibrate.set_up.trials import Trials
 from bentwing.odometry.imu_noise import ImuNoise
@@ -85,11 +85,19 @@ def describe_by_trials(
     mounted = itertools.chain(*map(descriptions.of_mounts, unmounted))
     others = itertools.chain(mounted, delayed[LIKELY:])
     if found := _first(trials.at_a_glance(other) for other in others) or trials.least_strained():
-        return found
+        return _not_mirrored(found, described)
     trials.require_scale_in_what_was_refused()
     if given is not None:
         trials.require_scale_of_gyro(given)
     raise NotFoundError(trials.failure)
+
+
+def _not_mirrored(found: Payload, described: NDArray[np.float64] | None) -> Payload:
+    """Return what was found, if it is not the mount as described in a mirrored world."""
+    R = edits.described_rotation(found)
+    if described is not None and R is not None and (doubt := turned_or_negated(R, described)):
+        raise NotFoundError(doubt)
+    return found
 
 
 def _first(found: Iterable[Payload | None]) -> Payload | None:

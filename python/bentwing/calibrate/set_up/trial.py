@@ -19,8 +19,9 @@ if TYPE_CHECKING:
     from bentwing.recording import ImuBatch, Payload
 
 # Of a right description 0.97 of the matches and more agree, of a wrong one at most 0.92.
-# In a glance a right description is a little blurred by where it came from.
-PROMISING = 0.88
+# In a glance a right description is a little blurred by where it came from, and in some seconds that
+# begin in the middle of a motion still by how it began.
+PROMISING, LIKELY = 0.88, 0.92
 # A wrong description never settles; a right one does soon.
 SETTINGS = ContinuousSettings(registration=RegistrationSettings(max_outer=8))
 # Forces are in units of a noise that is known to a factor only; with one axis negated they are off by 8. Of a
@@ -67,15 +68,23 @@ class Trial:
         )
 
     @property
+    def is_likely(self) -> bool:
+        """Whether what was seen fits together so well that a longer time is worth a look."""
+        return self._agrees(LIKELY)
+
+    @property
     def is_consistent(self) -> bool:
         """Whether what was seen fits together."""
+        return self._agrees(LEAST_INLIERS)
+
+    def _agrees(self, least_inliers: float) -> bool:
         last = self.last
         return (
             last is not None
             and last.inlier_share is not None
             and last.residual_rms is not None
             and self.n_matches >= FEWEST_MATCHES
-            and last.inlier_share >= LEAST_INLIERS
+            and last.inlier_share >= least_inliers
             and last.residual_rms <= MOST_RESIDUAL
             # In a mirrored world the surfaces agree as well, but not the forces.
             and self.force <= MOST_FORCE

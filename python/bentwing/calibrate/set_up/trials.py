@@ -117,13 +117,13 @@ class Trials:
         return self._refined(payload, trial, believed=rotation == AS_DESCRIBED)
 
     def _refined(self, payload: Payload, trial: Trial, *, believed: bool = False) -> Payload | None:
-        """Return what a consistent trial has told, if it holds for longer as well.
+        """Return what a likely trial has told, if it holds for longer as well.
 
         Parameters
         ----------
         believed : also where the accelerometer disagrees more than it does with a right description
         """
-        if not trial.is_consistent:
+        if not trial.is_likely:
             return None
         refinement = Refinement(
             self._stretch,

@@ -14,7 +14,7 @@ from bentwing.base.result_folder import ResultFolder
 from bentwing.closing.global_registration import Budget
 from bentwing.evaluate.verdict import Verdict
 from bentwing.fleet.discover import find_recordings
-from bentwing.fleet.folder import GROUPS, PAGE, RECORDINGS, SITE_FOLDER
+from bentwing.fleet.folder import PAGE, RECORDINGS, SITE_FOLDER
 from bentwing.fleet.groups import Group, finished_merging, merge_runs, merge_task
 from bentwing.fleet.manifest import MANIFEST_SUFFIXES, read_manifest
 from bentwing.fleet.memory import process_mb
@@ -119,7 +119,7 @@ def map_site(
         mapped = {one.name: one for one in [*refused, *_map(tasks, pool, progress)]}
         site = Site(out, [mapped[entry.name] for entry in entries])
         if merges:
-            site = _merged(site, choice, pool)
+            site = _merged(site, choice, pool, progress)
         record = site.to_json()
         write_site_page(folder.file(PAGE), record)
         folder.complete(manifests, record)
@@ -160,7 +160,7 @@ def _of_result(task: MapTask, result: Mapped | BaseException) -> Mapped:
     return Mapped(task.name, "failed", reason, request=task.request)
 
 
-def _merged(site: Site, choice: Choice, pool: LazyPool) -> Site:
+def _merged(site: Site, choice: Choice, pool: LazyPool, progress: Progress) -> Site:
     """Merge the runs that can be used."""
     usable = [one for one in site.recordings if one.is_usable]
     alone = [Group((one.name,), one.folder or site.out, one.state, one.reason) for one in usable]
@@ -179,12 +179,14 @@ def _merged(site: Site, choice: Choice, pool: LazyPool) -> Site:
     wanted = {name: getattr(settings, name) for name in settings.model_fields_set & {*named}}
     merging = merge_settings(**wanted, loop_closure=settings.closing)
     budget = Budget.of(sum(one.seconds for one in usable), merging.loop_closure)
-    task = merge_task(resolved(site.out) / GROUPS, usable, merging, process_mb(budget.megabytes))
+    task = merge_task(resolved(site.out), usable, merging, process_mb(budget.megabytes))
     answer = finished_merging(task)
     if answer is None:
         ((_, answer),) = pool.results([Job(task.key, merge_runs, task, task.megabytes)])
-    if isinstance(answer, BaseException):
-        answer = {"failed": str(answer) or type(answer).__name__}
+        if isinstance(answer, BaseException):
+            answer = {"failed": str(answer) or type(answer).__name__}
+        if "said" in answer:
+            progress.note(answer["said"])
     if "failed" in answer:
         return replace(site, groups=alone, failure=answer["failed"])
     by_name = {group.runs[0]: group for group in alone}

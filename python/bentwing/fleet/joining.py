@@ -84,8 +84,14 @@ def join_site(
     folders.sort(key=lambda folder: folder not in known)  # those that are there keep their names
     names = distinct_names([known[f].name if f in known else f.name for f in folders])
     runs = [mapped_in(f, n) for f, n in zip(folders, names, strict=True)]
-    with ResultFolder(out, SITE_FOLDER, folders) as folder, ExitStack() as stack:
-        site = merged_site(Site(out, runs), settings, LazyPool(opened, stack), progress)
+    # Until the new maps are made the site is what it was: who is interrupted can begin again.
+    lock, _ = SITE_FOLDER.claim(out, folders)
+    try:
+        with ExitStack() as stack:
+            site = merged_site(Site(out, runs), settings, LazyPool(opened, stack), progress)
+    finally:
+        lock.release()
+    with ResultFolder(out, SITE_FOLDER, folders) as folder:
         complete(folder, site, [])
     return site
 

@@ -88,6 +88,20 @@ def test_what_is_no_finished_run_is_refused_and_the_site_stays(site, join, tmp_p
     assert (site / "site.json").read_bytes() == before
 
 
+def test_a_site_is_what_it_was_until_the_new_maps_are_made(site, join, tmp_path):
+    write_run(tmp_path / "b2", "of b2", [])
+    before = (site / "site.json").read_bytes()
+    with pytest.raises(KeyboardInterrupt):
+        join_site([site, tmp_path / "b2"], site, {}, interrupted, Progress())
+    assert (site / "site.json").read_bytes() == before
+    assert groups(join(site, tmp_path / "b2")) == [("a1", "a2"), ("b1", "b2")]
+
+
+def interrupted(*_):
+    """Stands for a pool in which the user stops the work."""
+    raise KeyboardInterrupt
+
+
 def test_a_site_that_is_not_complete_is_no_list_of_runs(site):
     record = json.loads((site / "site.json").read_text())
     (site / "site.json").write_text(json.dumps({**record, "complete": False}))

@@ -111,6 +111,7 @@ def test_what_is_read_back_is_what_was_found(merged):
 
 def test_a_run_that_is_left_out_leaves_nothing_and_the_others_stay(merged, tmp_path):
     merged("a", "b", "c")
+    (tmp_path / "kept" / ".survey-1.host.17.partial").write_bytes(b"of a process that was killed")
     assert merged("a", "c")[2] == (0, 0)
     assert len([*(tmp_path / "kept").iterdir()]) == 2 + 1
 

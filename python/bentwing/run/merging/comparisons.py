@@ -7,9 +7,13 @@ requests of their runs, so what is kept is neither stale nor of other runs.
 
 from __future__ import annotations
 
+import os
+import platform
 from collections import Counter
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+from bentwing.base.atomic import TEMPORARY_SUFFIX
 from bentwing.base.run_record import RUN_FOLDER
 from bentwing.closing.joining.matches import compare
 from bentwing.closing.joining.stored import (
@@ -21,7 +25,7 @@ from bentwing.closing.joining.stored import (
 from bentwing.run.request import digest_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
     from pathlib import Path
 
     from bentwing.closing.joining.matches import Part
@@ -62,7 +66,8 @@ class Comparisons:
         survey = read_survey(path, source.name, source.estimate, source.payload)
         if survey is None:
             survey = made(source)
-            write_survey(path, survey)
+            with _named(path) as own:
+                write_survey(own, survey)
             self.done["surveys"] += 1
         return survey
 
@@ -79,7 +84,8 @@ class Comparisons:
             found = read_comparison(path)
             if found is None:
                 found = compare(parts[a], parts[b])
-                write_comparison(path, found)
+                with _named(path) as own:
+                    write_comparison(own, found)
                 self.done["comparisons"] += 1
             return found
 
@@ -96,14 +102,26 @@ class Comparisons:
 
     def remove_others(self) -> None:
         """Remove what this merging had no use for, as of runs that were left out."""
-        for path in self._folder.glob(f"*{_SUFFIX}"):
-            if path.name not in self._used:
+        for path in self._folder.iterdir():
+            is_ours = path.suffix in {
+                _SUFFIX,
+                TEMPORARY_SUFFIX,
+            }  # also of a process that was killed
+            if is_ours and path.name not in self._used:
                 path.unlink(missing_ok=True)
 
     def _path(self, what: str, asked: Mapping[str, object]) -> Path:
         name = f"{what}-{digest_of(asked)}{_SUFFIX}"
         self._used.add(name)
         return self._folder / name
+
+
+@contextmanager
+def _named(path: Path) -> Iterator[Path]:
+    """Yield a name of this process; a twin on another host may write the same file."""
+    own = path.with_name(f".{path.stem}.{platform.node()}.{os.getpid()}{TEMPORARY_SUFFIX}")
+    yield own
+    own.replace(path)
 
 
 def _request(source: Source) -> str:

@@ -60,11 +60,11 @@ class Worker:
 
 
 def jobs(n: int, seconds: float, seed: int) -> list[Work]:
-    """Work of this mean duration."""
+    """Work of this mean duration, the largest first as `fleet` has it."""
     generator = np.random.default_rng(seed)
     durations = generator.uniform(0.5, 1.5, n)
     durations[generator.random(n) < STRAGGLERS] *= SLOWER
-    durations *= seconds / durations.mean()
+    durations = -np.sort(-durations) * (seconds / durations.mean())
     dies = generator.random(n) < DEATHS
     return [
         Work(k, float(d), bool(b)) for k, (d, b) in enumerate(zip(durations, dies, strict=True))

@@ -136,6 +136,8 @@ def _map(tasks: Sequence[MapTask], pool: LazyPool, progress: Progress) -> Iterat
             todo.append(Job(task.key, map_recording_of, task, task.megabytes))
         else:
             yield done
+    # The largest first: one that is begun last keeps all others waiting.
+    todo.sort(key=lambda job: -job.megabytes)
     if len(todo) < len(tasks):
         progress.note(f"{len(tasks) - len(todo)} of {len(tasks)} recordings are mapped already")
     for number, (job, result) in enumerate(pool.results(todo), start=1):

@@ -196,6 +196,14 @@ def test_without_a_cluster_work_that_dies_is_tried_again_by_itself(
     assert beside["a1"] == beside["a2"] == 1
 
 
+def test_the_largest_recording_is_begun_first(work, manifest, tmp_path):
+    path = manifest(a1="1", a2="2" * 3000, a3="3" * 2000)
+    opened = lambda megabytes, n_jobs: LocalPool(1, 1, print)  # noqa: ARG005, E731
+    site = map_site([path], tmp_path / "out", Choice(), opened, Progress(), merges=False)
+    assert list(work.calls) == ["a2", "a3", "a1"]
+    assert [one.name for one in site.recordings] == ["a1", "a2", "a3"]
+
+
 def test_work_that_another_process_does_is_waited_for(fleet, manifest, work):
     work.twins.add("a1")
     assert fleet(manifest(a1="1", a2="2")).is_complete

@@ -127,6 +127,26 @@ def test_a_fleet_survives_the_death_of_a_worker(bentwing, flights, tmp_path):
     assert {path: path.stat().st_ino for path in out.rglob("run.json")} == before
 
 
+@pytest.mark.slow
+def test_a_further_recording_costs_no_other_its_survey(bentwing, flights, tmp_path):
+    later = flights / "noon"
+    later.rename(tmp_path / "noon")
+    shutil.rmtree(flights / "damaged")
+    out = tmp_path / "site"
+    command = ("fleet", flights, "-o", out, "--workers", 1, *THIN)
+    assert bentwing(*command).code == 0
+    (tmp_path / "noon").rename(later)
+    run = tmp_path / "noon"
+    assert bentwing("map", later / "recording.bag", "-p", later / "payload.yaml", "-o", run, *THIN).code == 0  # fmt: skip
+    said = bentwing("merge", out, run, "-o", out)
+    assert said.code == 0, said.err
+    assert "surveyed 1 of 3 runs and compared 2 of 3 pairs" in said.err
+    again, whole = out / "groups" / "1", tmp_path / "whole"
+    assert bentwing(*("fleet", flights, "-o", whole, "--workers", 1, *THIN)).code == 0
+    for name in ("map.laz", "trajectory_noon.txt"):
+        assert (again / name).read_bytes() == (whole / "groups" / "1" / name).read_bytes()
+
+
 def worker_of_a_map(process):
     """Wait until a recording is being mapped, and return the process of its worker."""
     fleet = psutil.Process(process.pid)

@@ -11,6 +11,7 @@ from bentwing.cli import options
 EXAMPLES = (
     "bentwing merge morning noon evening -o site",
     "bentwing merge morning noon -o site --map-format e57 --map-spacing 0.02",
+    "bentwing merge site later -o site",
     "bentwing merge morning noon -o site --epsg 25832 --control-points marks.csv",
 )
 
@@ -20,7 +21,7 @@ def command(
         list[Path],
         typer.Argument(
             metavar="RUN",
-            help="Folders that `bentwing map` has written.",
+            help="Folders that `bentwing map` has written; a site of `bentwing fleet` stands for its runs.",
             rich_help_panel=options.INPUT,
         ),
     ],
@@ -46,24 +47,42 @@ def command(
     """
     # slow to import, so only when it is needed
     from bentwing.base.progress import create_progress
-    from bentwing.cli.done import say_maps
+    from bentwing.cli.done import say_maps, say_site
     from bentwing.closing.georeference.settings import GeoreferenceSettings
+    from bentwing.fleet.joining import is_site, join_site, runs_of
+    from bentwing.fleet.opened import side_by_side
     from bentwing.map.clean import CleanSettings
+    from bentwing.recording.sections.project import Project
     from bentwing.run.choose import given
     from bentwing.run.merging import merge
 
+    progress = create_progress(quiet=quiet)
+    cleaned = options.cleaning(keep_mixed=keep_mixed, keep_moving=keep_moving)
+    on_earth = given(mode=georeference, epsg=epsg, control_points=control_points)
+    if is_site(out):
+        asked = given(
+            map_format=map_format,
+            map_spacing=map_spacing,
+            georeferencing=on_earth or None,
+            cleaning=cleaned or None,
+            project=None if project is None else Project.load(project),
+            refine=False if no_refine else None,
+            normals=True if normals else None,
+        )
+        site = join_site(runs, out, asked, side_by_side(threads, progress), progress)
+        say_site(site, quiet=quiet)
+        return
+    runs = runs_of(runs)
     merged = merge(
         runs,
         out,
         **given(map_format=map_format, map_spacing=map_spacing),
-        georeferencing=GeoreferenceSettings(
-            **given(mode=georeference, epsg=epsg, control_points=control_points)
-        ),
-        cleaning=CleanSettings(**options.cleaning(keep_mixed=keep_mixed, keep_moving=keep_moving)),
+        georeferencing=GeoreferenceSettings(**on_earth),
+        cleaning=CleanSettings(**cleaned),
         project=project,
         refine=not no_refine,
         normals=normals,
         threads=threads,
-        progress=create_progress(quiet=quiet),
+        progress=progress,
     )
     say_maps(merged, quiet=quiet)

@@ -56,7 +56,14 @@ def merge_all(order: dict[str, Any], progress: Progress) -> dict[str, Any]:
     settings = MergeSettings.model_validate_json(order["settings"])
     settings = settings.model_copy(update={"threads": order["threads"]})
     try:
-        return merge_groups(order["runs"], Path(order["out"]), settings, order["made"], progress)
+        return merge_groups(
+            order["runs"],
+            Path(order["out"]),
+            settings,
+            order["made"],
+            kept=Path(order["kept"]),
+            progress=progress,
+        )
     except FolderBusyError as error:
         return {BUSY: str(error)}
     except BentwingError as error:

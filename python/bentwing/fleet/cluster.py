@@ -23,7 +23,7 @@ ADDRESS = "DASK_ADDRESS"
 MEMORY = "MEM"
 """Resource of workers: the memory that they have for bentwing, MB."""
 RETRIES = 2
-"""Times that work is tried again which ended without an answer."""
+"""Times that work is tried again which ended without an answer, each time with twice the memory."""
 # A recording is not to blame for every worker that dies while it maps it; and there is nothing to
 # profile in a worker that waits for a process.
 _OF_CLUSTER = {
@@ -66,29 +66,38 @@ class ClusterPool:
         self._client, self._threads, self._n_here = client, threads, n_here
 
     def results(self, jobs: Sequence[Job]) -> Iterator[tuple[Job, Any]]:
-        """Yield each job with its result or exception."""
+        """Yield each job with its result or exception, after trying again with twice the memory."""
         most = _memory_of_workers(self._client)
         threads = self._threads
         if self._n_here is not None:
             threads = threads_among(self._n_here, len(jobs), threads)
-        futures = {
-            self._client.submit(
-                job.function,
-                job.task,
-                threads,
-                key=job.key,
-                retries=RETRIES,
-                # More than the largest worker has would wait for ever.
-                resources=None if most is None else {MEMORY: min(job.megabytes, most)},
-            ): job
-            for job in jobs
-        }
+        futures = {self._submit(job, threads, most, 0): (job, 0) for job in jobs}
+        completed = require_dask().as_completed(list(futures))
         try:
-            for future in require_dask().as_completed(list(futures)):
-                job = futures.pop(future)
-                yield job, future.exception() or future.result()
+            for future in completed:
+                job, n_failures = futures.pop(future)
+                error = future.exception()
+                if error is not None and n_failures < RETRIES:
+                    again = self._submit(job, threads, most, n_failures + 1)
+                    futures[again] = job, n_failures + 1
+                    completed.add(again)
+                else:
+                    yield job, error or future.result()
         finally:
             self._client.cancel(list(futures))
+
+    def _submit(self, job: Job, threads: int | None, most: float | None, n_failures: int) -> Any:  # noqa: ANN401 - dask's
+        """Give a job to the cluster, with more memory each time that it failed."""
+        megabytes = job.megabytes * 2**n_failures
+        return self._client.submit(
+            job.function,
+            job.task,
+            threads,
+            # A key that failed is remembered as failed.
+            key=job.key if n_failures == 0 else f"{job.key}-again-{n_failures}",
+            # More than the largest worker has would wait for ever.
+            resources=None if most is None else {MEMORY: min(megabytes, most)},
+        )
 
 
 def address_of(scheduler: str | None, workers: int | None) -> str | None:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 SITE_RECORD = "site.json"
 SITE_FOLDER = RecordedFolder(SITE_RECORD, "bentwing site", "site")
 PAGE = "index.html"
-RECORDINGS, GROUPS = "recordings", "groups"
+RECORDINGS, GROUPS, COMPARISONS = "recordings", "groups", "comparisons"
 _SHOWN = 16  # digits of a request in a name
 _OTHER = "{place}: holds something else than a run; move it away, or choose another folder"
 # What tells nothing of the recording: times, and what is drawn with them.

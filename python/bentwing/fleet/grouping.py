@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from bentwing.base.run_record import RUN_FOLDER, read_record
 from bentwing.run.merging import (
+    Comparisons,
     budget_of,
     describe_map,
     find_groups,
@@ -37,6 +38,8 @@ def merge_groups(
     out: Path,
     settings: MergeSettings,
     made: Mapping[str, str],
+    *,
+    kept: Path,
     progress: Progress,
 ) -> dict[str, Any]:
     """Find the groups of runs, and make the maps of those that are not there yet.
@@ -46,11 +49,12 @@ def merge_groups(
     runs : run folders by name
     out : folder in which each group that is made gets a folder
     made : folders of complete groups by their requests
+    kept : folder of what comparing runs has found, so that it is found once
 
     Returns
     -------
     `groups`, each with its runs, its folder (None for a run that belongs to no other), its verdict and
-    whether it was there, and `places`: what was compared.
+    whether it was there, `places`: what was compared, and `said`: how much of that was done now.
 
     Raises
     ------
@@ -61,9 +65,16 @@ def merge_groups(
         replace(source, name=name) for source, name in zip(open_sources(folders), runs, strict=True)
     ]
     settings = settled(settings, sources)
-    groups, found = find_groups(sources, settings, progress, lambda _: nullcontext())
+    comparisons = Comparisons(kept)
+    groups, found = find_groups(sources, settings, progress, lambda _: nullcontext(), comparisons)
     rooms = _Rooms(out, made, found, settings, budget_of(sources, settings).rate)
-    return {"groups": rooms.answers(groups), "places": found.record}
+    answer = {
+        "groups": rooms.answers(groups),
+        "places": found.record,
+        "said": comparisons.sentence(),
+    }
+    comparisons.remove_others()
+    return answer
 
 
 @dataclass(slots=True)

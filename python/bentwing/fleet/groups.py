@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from bentwing.base.atomic import write_text
 from bentwing.base.errors import BentwingError
 from bentwing.base.run_record import RUN_FOLDER, finished_record
-from bentwing.fleet.folder import clear_staging, publish, staging_of
+from bentwing.fleet.folder import COMPARISONS, GROUPS, clear_staging, publish, staging_of
 from bentwing.fleet.process import Processes, run_unless_done
 from bentwing.run.request import deciding, digest_of, record_of_request
 
@@ -53,6 +53,7 @@ class MergeTask:
     Attributes
     ----------
     place : folder of the groups' folders
+    kept : folder of what comparing runs has found
     runs : run folders by name
     settings : JSON, what was given only
     request : SHA-256 of the runs' requests, settings and version
@@ -60,6 +61,7 @@ class MergeTask:
     """
 
     place: Path
+    kept: Path
     runs: Mapping[str, Path]
     settings: str
     request: str
@@ -72,9 +74,9 @@ class MergeTask:
 
 
 def merge_task(
-    place: Path, usable: Sequence[Mapped], settings: MergeSettings, megabytes: float
+    site: Path, usable: Sequence[Mapped], settings: MergeSettings, megabytes: float
 ) -> MergeTask:
-    """Return the merging of runs that can be used, in the order given."""
+    """Return the merging of runs that can be used, in the order given, in the folder of a site."""
     runs = {one.name: one.folder for one in usable if one.folder is not None}
     asked = {
         "settings": deciding(settings),
@@ -82,7 +84,9 @@ def merge_task(
     }
     # Unset values are filled in with what the runs agree on, so they must stay unset.
     described = settings.model_dump_json(exclude_unset=True)
-    return MergeTask(place, runs, described, digest_of(asked), megabytes)
+    return MergeTask(
+        site / GROUPS, site / COMPARISONS, runs, described, digest_of(asked), megabytes
+    )
 
 
 def merge_runs(
@@ -101,7 +105,7 @@ def merge_runs(
     staging = staging_of(task.place, task.request)
     order = {
         "runs": task.runs, "settings": task.settings, "threads": threads, "out": staging,
-        "made": _made(task.place),
+        "made": _made(task.place), "kept": task.kept,
     }  # fmt: skip
     answer = run_unless_done("merge", order, "merge", processes, lambda: finished_merging(task))
     if "failed" in answer or "request" in answer:

@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
-from bentwing.fleet.process import Processes
+from bentwing.fleet.process import ProcessDiedError, Processes
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -71,14 +71,25 @@ class LocalPool:
         self._executor.shutdown(cancel_futures=True)
 
     def results(self, jobs: Sequence[Job]) -> Iterator[tuple[Job, Any]]:
-        """Yield each job with its result or exception."""
+        """Yield each job with its result or exception; those whose process died after one more try.
+
+        They are tried when nothing else runs, so that they have all of the memory.
+        """
         threads = threads_among(self._n, len(jobs), self._threads)
         futures = {
             self._executor.submit(job.function, job.task, threads, self._processes): job
             for job in jobs
         }
+        died = []
         for future in as_completed(futures):
-            yield futures[future], future.exception() or future.result()
+            error = future.exception()
+            if isinstance(error, ProcessDiedError):
+                died.append(futures[future])
+            else:
+                yield futures[future], error or future.result()
+        for job in died:
+            future = self._executor.submit(job.function, job.task, threads, self._processes)
+            yield job, future.exception() or future.result()
 
 
 def threads_among(n_workers: int, n_jobs: int, threads: int | None) -> int:

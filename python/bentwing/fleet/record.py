@@ -8,13 +8,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from bentwing.base.regular_file import resolved
+from bentwing.base.run_record import understood
+from bentwing.fleet.task import Mapped
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
     from bentwing.fleet.groups import Group
-    from bentwing.fleet.task import Mapped
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +29,7 @@ class Site:
     groups : runs in one frame each, the merged ones first; None where nothing was merged
     failure : why there are no merged maps, empty where there are
     places : what the merging compared, as in run.json
+    merging : settings of the merging that were given
     """
 
     out: Path
@@ -35,6 +37,7 @@ class Site:
     groups: list[Group] | None = None
     failure: str = ""
     places: Mapping[str, Any] | None = None
+    merging: Mapping[str, Any] | None = None
 
     @property
     def is_complete(self) -> bool:
@@ -54,7 +57,19 @@ class Site:
             "groups": None if groups is None else [_group(one, self.out) for one in groups],
             "failure": self.failure or None,
             "places": self.places,
+            "merging": self.merging,
         }
+
+
+def usable_in(record: Mapping[str, Any], out: Path) -> list[Mapped]:
+    """Return the recordings of a site whose runs can be used, from its record."""
+    with understood(out):
+        found = [
+            Mapped(one["name"], one["state"], folder=out / one["folder"])
+            for one in record["recordings"]
+            if one["folder"] is not None
+        ]
+    return [one for one in found if one.is_usable]
 
 
 def _recording(one: Mapped, out: Path) -> dict[str, Any]:

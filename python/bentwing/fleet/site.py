@@ -4,37 +4,33 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bentwing.base.progress import Progress, as_progress
 from bentwing.base.regular_file import resolved
 from bentwing.base.result_folder import ResultFolder
-from bentwing.closing.global_registration import Budget
-from bentwing.evaluate.verdict import Verdict
 from bentwing.fleet.discover import find_recordings
-from bentwing.fleet.folder import GROUPS, PAGE, RECORDINGS, SITE_FOLDER
-from bentwing.fleet.groups import Group, finished_merging, merge_runs, merge_task
+from bentwing.fleet.folder import RECORDINGS, SITE_FOLDER
+from bentwing.fleet.joining import complete, merged_site
 from bentwing.fleet.manifest import MANIFEST_SUFFIXES, read_manifest
-from bentwing.fleet.memory import process_mb
 from bentwing.fleet.opened import LazyPool, on_cluster
 from bentwing.fleet.plan import Choice, plan
 from bentwing.fleet.pool import Job
 from bentwing.fleet.record import Site
-from bentwing.fleet.task import Mapped, finished, map_recording_of, reason_of, sentence_of
+from bentwing.fleet.task import Mapped, finished, map_recording_of, sentence_of
 from bentwing.recording.ready import payload_path
-from bentwing.report.site import write_site_page
 from bentwing.run.settings import merge_settings
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Iterator, Sequence
 
     from bentwing.fleet.entry import Entry
     from bentwing.fleet.opened import Opened
     from bentwing.fleet.task import MapTask
     from bentwing.map import MapFormat
     from bentwing.odometry import EstimatorName
+    from bentwing.run.settings import MergeSettings
 
 
 def map_fleet(
@@ -119,10 +115,8 @@ def map_site(
         mapped = {one.name: one for one in [*refused, *_map(tasks, pool, progress)]}
         site = Site(out, [mapped[entry.name] for entry in entries])
         if merges:
-            site = _merged(site, choice, pool)
-        record = site.to_json()
-        write_site_page(folder.file(PAGE), record)
-        folder.complete(manifests, record)
+            site = merged_site(site, _merging_of(choice), pool, progress)
+        complete(folder, site, manifests)
     return site
 
 
@@ -142,6 +136,8 @@ def _map(tasks: Sequence[MapTask], pool: LazyPool, progress: Progress) -> Iterat
             todo.append(Job(task.key, map_recording_of, task, task.megabytes))
         else:
             yield done
+    # The largest first: one that is begun last keeps all others waiting.
+    todo.sort(key=lambda job: -job.megabytes)
     if len(todo) < len(tasks):
         progress.note(f"{len(tasks) - len(todo)} of {len(tasks)} recordings are mapped already")
     for number, (job, result) in enumerate(pool.results(todo), start=1):
@@ -160,12 +156,8 @@ def _of_result(task: MapTask, result: Mapped | BaseException) -> Mapped:
     return Mapped(task.name, "failed", reason, request=task.request)
 
 
-def _merged(site: Site, choice: Choice, pool: LazyPool) -> Site:
-    """Merge the runs that can be used."""
-    usable = [one for one in site.recordings if one.is_usable]
-    alone = [Group((one.name,), one.folder or site.out, one.state, one.reason) for one in usable]
-    if len(usable) < 2:
-        return replace(site, groups=alone)
+def _merging_of(choice: Choice) -> MergeSettings:
+    """Return how the runs are merged, by what is the same for all recordings."""
     settings = choice.settings()
     named = (
         "map_format",
@@ -177,32 +169,4 @@ def _merged(site: Site, choice: Choice, pool: LazyPool) -> Site:
         "project",
     )
     wanted = {name: getattr(settings, name) for name in settings.model_fields_set & {*named}}
-    merging = merge_settings(**wanted, loop_closure=settings.closing)
-    budget = Budget.of(sum(one.seconds for one in usable), merging.loop_closure)
-    task = merge_task(resolved(site.out) / GROUPS, usable, merging, process_mb(budget.megabytes))
-    answer = finished_merging(task)
-    if answer is None:
-        ((_, answer),) = pool.results([Job(task.key, merge_runs, task, task.megabytes)])
-    if isinstance(answer, BaseException):
-        answer = {"failed": str(answer) or type(answer).__name__}
-    if "failed" in answer:
-        return replace(site, groups=alone, failure=answer["failed"])
-    by_name = {group.runs[0]: group for group in alone}
-    groups = [
-        by_name[one["runs"][0]] if one["folder"] is None else _group(task.place, one)
-        for one in answer["groups"]
-    ]
-    groups.sort(key=lambda group: len(group.runs) == 1)
-    return replace(site, groups=groups, places=answer["places"])
-
-
-def _group(place: Path, answer: Mapping[str, Any]) -> Group:
-    verdict = Verdict.from_json(answer["verdict"])
-    return Group(
-        tuple(answer["runs"]),
-        place / answer["folder"],
-        verdict.state,
-        reason_of(verdict),
-        answer["n_links"],
-        answer["is_earlier"],
-    )
+    return merge_settings(**wanted, loop_closure=settings.closing)

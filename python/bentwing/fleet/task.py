@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from bentwing.base.errors import BentwingError, UsageError
 from bentwing.base.provenance import bentwing_version
-from bentwing.base.run_record import RUN_FOLDER, understood
+from bentwing.base.run_record import RUN_FOLDER, finished_record, understood
 from bentwing.fleet.folder import publish, require_run_or_nothing, staging_of
 from bentwing.fleet.process import Processes, run_unless_done
-from bentwing.run.request import record_of_request
-from bentwing.run.run import verdict_in
+from bentwing.run.request import digest_of, record_of_request
+from bentwing.run.run import require_single, verdict_in
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -89,7 +89,21 @@ class Mapped:
 def finished(task: MapTask) -> Mapped | None:
     """Return what came of a recording if its run is there, made in the same way."""
     record = record_of_request(task.place, task.request, task.recordings)
-    return None if record is None else replace(_mapped(task, record), is_earlier=True)
+    if record is None:
+        return None
+    return replace(_mapped(task.name, task.place, record), is_earlier=True)
+
+
+def mapped_in(folder: Path, name: str) -> Mapped:
+    """Return what is in the folder of a finished run, wherever and by whatever it was made.
+
+    Raises
+    ------
+    UsageError, InputError
+        If there is no complete run, or its files are others.
+    """
+    record = require_single(folder, finished_record(folder))
+    return replace(_mapped(name, folder, record), is_earlier=True)
 
 
 def map_recording_of(
@@ -129,18 +143,19 @@ def _made(task: MapTask, threads: int | None, processes: Processes | None) -> Ma
         return Mapped(task.name, "failed", answer["failed"], folder, task.request)
     if "refused" in answer:
         return Mapped(task.name, "refused", answer["refused"], folder, task.request)
-    return _mapped(task, RUN_FOLDER.read(task.place) or {})
+    return _mapped(task.name, task.place, RUN_FOLDER.read(task.place) or {})
 
 
-def _mapped(task: MapTask, record: Mapping[str, Any]) -> Mapped:
-    with understood(task.place):
+def _mapped(name: str, folder: Path, record: Mapping[str, Any]) -> Mapped:
+    with understood(folder):
         verdict = verdict_in(record)
         return Mapped(
-            task.name,
+            name,
             verdict.state,
             reason_of(verdict),
-            task.place,
-            task.request,
+            folder,
+            # Earlier versions did not note what was asked; their bytes stand for it.
+            str(record.get("request") or digest_of(record)),
             float(sum(last - first for first, last in record.get("segments") or [])),
             int((record.get("counts") or {}).get("map.written", 0)),
         )

@@ -7,22 +7,18 @@ what the record said then are read back bit for bit, so that the results are tho
 
 from __future__ import annotations
 
-import hashlib
-import io
-import json
 from typing import TYPE_CHECKING, Any
-from zipfile import BadZipFile, ZipFile
 
 import numpy as np
 
-from bentwing.base.atomic import write_bytes
 from bentwing.base.breaks import Break
 from bentwing.base.calibration import Calibration
 from bentwing.base.covariances import PoseCovariances
-from bentwing.base.errors import BentwingError, UsageError
+from bentwing.base.errors import UsageError
 from bentwing.base.estimate import Estimate
 from bentwing.base.plain import plain
 from bentwing.base.result_folder import is_plain_name
+from bentwing.base.sealed import DAMAGE, read_sealed, write_sealed
 from bentwing.base.trajectory import Trajectory
 from bentwing.base.window_record import WindowRecord
 from bentwing.calibrate.set_up import SetUp
@@ -32,8 +28,6 @@ from bentwing.run.found import Found, Reading, Spin
 from bentwing.run.request import deciding
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from bentwing.run.folder import RunFolder
     from bentwing.run.settings import RunSettings
 
@@ -44,12 +38,6 @@ _SHORT = "short_variances"
 _OF_ESTIMATE = ("windows", "counts", "timings", "health", "notes", "breaks", "segments")
 _CORRECTIONS = ("localization", "loop_closure", "merging")
 STAGES = ("estimate", "loops")
-_DIGEST = hashlib.sha256().digest_size
-# What reading something that bentwing has not written ends in.
-_DAMAGE = (
-    ArithmeticError, AttributeError, BadZipFile, BentwingError, EOFError, LookupError, MemoryError,
-    NotImplementedError, RecursionError, TypeError, ValueError,
-)  # fmt: skip
 
 
 class Checkpoint:
@@ -94,15 +82,8 @@ class Checkpoint:
             "timings": record.timings,
             "files": [name for name in record.files if name != NAME],
         }
-        data = io.BytesIO()
-        np.savez(
-            data,
-            described=np.array(json.dumps(plain(described))),
-            spin=np.array(found.spin.samples).reshape(-1, 2),
-            **arrays,
-        )
-        content = data.getvalue()
-        write_bytes(self._folder.file(NAME), content + hashlib.sha256(content).digest())
+        arrays["spin"] = np.array(found.spin.samples).reshape(-1, 2)
+        write_sealed(self._folder.file(NAME), described, arrays)
         self._folder.save()  # a run that is killed now is known to have this file
 
     def restore(self, *, resume: bool) -> tuple[str | None, Found]:
@@ -124,10 +105,10 @@ class Checkpoint:
         if not resume:
             return None, Found()
         try:
-            arrays, described = _read(self._path)
+            arrays, described = read_sealed(self._path)
         except FileNotFoundError:
             return None, Found()
-        except (OSError, *_DAMAGE) as error:
+        except (OSError, *DAMAGE) as error:
             return None, self._anew(error)
         self._require_same(described.get("asked"))
         try:
@@ -136,7 +117,7 @@ class Checkpoint:
                 return None, Found()
             timings = {name: float(value) for name, value in described["timings"].items()}
             found = _found(arrays, described)
-        except _DAMAGE as error:
+        except DAMAGE as error:
             return None, self._anew(error)
         for name in (*files, NAME):
             self._folder.file(name)
@@ -173,32 +154,6 @@ class Checkpoint:
                 "give the same, or leave --resume out to begin anew"
             )
             raise UsageError(msg)
-
-
-def _read(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return the arrays and the description in a checkpoint that is as it was written.
-
-    Raises
-    ------
-    OSError, or one of _DAMAGE
-    """
-    whole = path.read_bytes()
-    content, digest = whole[:-_DIGEST], whole[-_DIGEST:]
-    if hashlib.sha256(content).digest() != digest:
-        msg = "it is damaged: its SHA-256 is another"
-        raise ValueError(msg)
-    with ZipFile(io.BytesIO(content)) as packed:
-        # Written without compression: nothing in it is larger than the file.
-        if sum(entry.file_size for entry in packed.infolist()) > len(content):
-            msg = "it announces more than it holds"
-            raise ValueError(msg)
-    with np.load(io.BytesIO(content), allow_pickle=False) as stored:
-        arrays = {name: stored[name] for name in stored.files}
-    described = json.loads(str(arrays["described"]))
-    if not isinstance(described, dict):
-        msg = "it describes nothing"
-        raise TypeError(msg)
-    return arrays, described
 
 
 def _found(arrays: dict[str, Any], described: dict[str, Any]) -> Found:

@@ -52,7 +52,9 @@ def merge(tmp_path, monkeypatch):
             monkeypatch.setattr(grouping, name, fake)
         runs = {source.name: str(source.folder) for source in sources}
         settings = merge_settings(map_spacing=spacing)
-        answer = grouping.merge_groups(runs, tmp_path / "groups", settings, dict(made), None)
+        answer = grouping.merge_groups(
+            runs, tmp_path / "groups", settings, dict(made), kept=tmp_path / "kept", progress=None
+        )
         return [one["folder"] for one in answer["groups"]], list(fresh)
 
     return run

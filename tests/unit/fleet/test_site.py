@@ -5,15 +5,20 @@ from __future__ import annotations
 
 import json
 import sys
+from collections import Counter
+from threading import Barrier
 
 import distributed
 import pytest
 
 from bentwing.base.errors import InputError, UsageError
 from bentwing.base.progress import LineProgress, Progress
-from bentwing.fleet.cluster import MEMORY, RETRIES
+from bentwing.fleet import process
+from bentwing.fleet.cluster import MEMORY, RETRIES, ClusterPool
 from bentwing.fleet.opened import side_by_side
 from bentwing.fleet.plan import Choice
+from bentwing.fleet.pool import Job, LocalPool
+from bentwing.fleet.process import ProcessDiedError
 from bentwing.fleet.site import map_fleet, map_site
 
 
@@ -141,6 +146,62 @@ def test_work_that_dies_is_tried_again(fleet, manifest, work):
     assert work.calls["a1"] == work.calls["merge"] == RETRIES + 1
     names = {path.name for path in site.out.iterdir()}
     assert names == {"recordings", "groups", "site.json", "index.html"}
+
+
+def test_work_that_dies_is_given_twice_the_memory_up_to_what_a_worker_has(client, work):
+    asked = []
+
+    class Asked:
+        def submit(self, *arguments, resources, **options):
+            asked.append(resources[MEMORY])
+            return client.submit(*arguments, resources=resources, **options)
+
+        def __getattr__(self, name):
+            return getattr(client, name)
+
+    def dies(task, threads):
+        del threads
+        raise ProcessDiedError(task)
+
+    job = Job("dies", dies, "killed", 40.0)
+    ((found, error),) = ClusterPool(Asked(), None).results([job])
+    assert found is job
+    assert isinstance(error, ProcessDiedError)
+    assert asked == [40.0, 80.0, 100.0]
+    assert not work.calls
+
+
+def test_without_a_cluster_work_that_dies_is_tried_again_by_itself(
+    work, manifest, tmp_path, monkeypatch
+):
+    path = manifest(a1="1", a2="2", a3="3", a4="4")
+    both, running, beside = Barrier(2), Counter(), {}
+
+    def mapped(kind, order, name, processes):
+        running[name] += 1
+        if name in {"a1", "a2"} and not work.calls[name]:
+            both.wait(60)
+        beside[name] = len(running)
+        try:
+            return work(kind, order, name, processes)
+        finally:
+            del running[name]
+
+    work.deaths["a1"], work.deaths["a2"] = 1, 2
+    monkeypatch.setattr(process, "run_process", mapped)
+    opened = lambda megabytes, n_jobs: LocalPool(2, 1, print)  # noqa: ARG005, E731
+    site = map_site([path], tmp_path / "out", Choice(), opened, Progress(), merges=False)
+    assert states(site) == {"a1": "good", "a2": "failed", "a3": "good", "a4": "good"}
+    assert work.calls["a1"] == work.calls["a2"] == 2
+    assert beside["a1"] == beside["a2"] == 1
+
+
+def test_the_largest_recording_is_begun_first(work, manifest, tmp_path):
+    path = manifest(a1="1", a2="2" * 3000, a3="3" * 2000)
+    opened = lambda megabytes, n_jobs: LocalPool(1, 1, print)  # noqa: ARG005, E731
+    site = map_site([path], tmp_path / "out", Choice(), opened, Progress(), merges=False)
+    assert list(work.calls) == ["a2", "a3", "a1"]
+    assert [one.name for one in site.recordings] == ["a1", "a2", "a3"]
 
 
 def test_work_that_another_process_does_is_waited_for(fleet, manifest, work):

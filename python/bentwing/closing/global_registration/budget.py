@@ -56,7 +56,8 @@ class Budget:
         n = min(n_usual, max(affordable, MIN_SHARE * n_usual))
         return cls(
             seconds=seconds,
-            rate=n / seconds if seconds > 0 else usual,
+            # Exactly the usual one where all fits, whatever the length.
+            rate=n / seconds if n < n_usual else usual,
             n_surfels=int(n),
             n_unknowns=_n_unknowns(seconds, settings),
             megabytes=1e-6 * (fixed + each * n),

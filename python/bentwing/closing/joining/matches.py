@@ -17,7 +17,7 @@ from bentwing.closing.joining.survey import middle_of
 from bentwing.closing.places import MatchSettings, match_places
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
     from bentwing.base.progress import Stage
     from bentwing.closing.joining.survey import Survey
@@ -86,25 +86,35 @@ def parts_of(surveys: Sequence[Survey]) -> dict[Part, list[Place]]:
     return parts
 
 
-def find_matches(parts: dict[Part, list[Place]], shown: Stage | None = None) -> list[Match]:
-    """Compare the places of all pairs of parts; those that contradict the others are not believed."""
+def find_matches(
+    parts: dict[Part, list[Place]],
+    shown: Stage | None = None,
+    compared: Callable[[Part, Part], list[Candidate]] | None = None,
+) -> list[Match]:
+    """Compare the places of all pairs of parts; those that contradict the others are not believed.
+
+    Parameters
+    ----------
+    compared : returns what `compare` says of the places of two parts; default: compares them
+    """
+    compared = compared or (lambda a, b: compare(parts[a], parts[b]))
     found: list[Match] = []
     for a, b in combinations(parts, 2):
-        if parts[a] and parts[b]:
-            found += consistent(_between(a, b, parts[a], parts[b]))
+        if (of_a := parts[a]) and (of_b := parts[b]):
+            candidates = compared(a, b)
+            found += consistent(
+                [Match(a, b, c, of_a[c.i], of_b[c.j], c.reason) for c in candidates]
+            )
         if shown is not None:
             shown.advance(1.0)
     return found
 
 
-def _between(a: Part, b: Part, of_a: Sequence[Place], of_b: Sequence[Place]) -> list[Match]:
+def compare(of_a: Sequence[Place], of_b: Sequence[Place]) -> list[Candidate]:
+    """Compare the places of two parts."""
     most = MatchSettings().max_candidates
     n = int(np.clip(_TRIED // max(len(of_a), len(of_b)), _FEWEST_CANDIDATES, most))
-    settings = MatchSettings(max_candidates=n)
-    return [
-        Match(a, b, c, of_a[c.i], of_b[c.j], c.reason)
-        for c in match_places(of_a, of_b, settings=settings)
-    ]
+    return match_places(of_a, of_b, settings=MatchSettings(max_candidates=n))
 
 
 def consistent(matches: Sequence[Match]) -> list[Match]:

@@ -7,6 +7,7 @@ parts that nothing links are reported as separate.
 
 from __future__ import annotations
 
+from bentwing.run.merging.comparisons import Comparisons
 from bentwing.run.merging.maps import MergedMap, describe_map, make_map
 from bentwing.run.merging.runs import (
     Merged,
@@ -19,6 +20,7 @@ from bentwing.run.merging.runs import (
 from bentwing.run.merging.source import open_sources
 
 __all__ = [
+    "Comparisons",
     "Merged",
     "MergedMap",
     "budget_of",

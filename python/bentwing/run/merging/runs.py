@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 
     from bentwing.closing.joining.placing import Placed
     from bentwing.recording.sections.project import Project
+    from bentwing.run.merging.comparisons import Comparisons
     from bentwing.run.settings import MergeSettings
 
 
@@ -164,22 +165,24 @@ def find_groups(
     settings: MergeSettings,
     progress: Progress,
     stage: Callable[[str], AbstractContextManager[None]],
+    kept: Comparisons | None = None,
 ) -> tuple[list[Placed], Ingredients]:
     """Find which runs have places in common, and where these put them.
 
     Parameters
     ----------
     stage : called with the name of each step, times it
+    kept : what an earlier merging has found, and where that of this one is kept
 
     Returns
     -------
     The groups of runs, and what their maps are made of.
     """
     with stage("survey"):
-        surveys = _surveyed(sources, settings, progress)
+        surveys = _surveyed(sources, settings, progress, kept)
     parts = parts_of(surveys)
     with stage("match"), progress.stage("match", _n_pairs(len(parts)), "pairs") as shown:
-        matches = find_matches(parts, shown)
+        matches = find_matches(parts, shown, None if kept is None else kept.of(sources, parts))
     trajectories = {
         Part(r, s): stretches.trajectory
         for r, one in enumerate(surveys)
@@ -209,22 +212,26 @@ def budget_of(sources: Sequence[Source], settings: MergeSettings) -> Budget:
 
 
 def _surveyed(
-    sources: Sequence[Source], settings: MergeSettings, progress: Progress
+    sources: Sequence[Source],
+    settings: MergeSettings,
+    progress: Progress,
+    kept: Comparisons | None,
 ) -> list[Survey]:
     budget = budget_of(sources, settings)
     progress.note(f"merging: {budget.sentence()}")
-    surveys = []
-    for source in sources:
+
+    def survey_of(source: Source) -> Survey:
         with source.part() as part, progress.stage(f"survey {source.name}", part.length) as shown:
-            surveys.append(
-                survey(
-                    source.name,
-                    source.estimate,
-                    part.batches(shown, Counter()),
-                    source.payload,
-                    surfel_rate=budget.rate,
-                    settings=settings.loop_closure,
-                    threads=settings.threads,
-                )
+            return survey(
+                source.name,
+                source.estimate,
+                part.batches(shown, Counter()),
+                source.payload,
+                surfel_rate=budget.rate,
+                settings=settings.loop_closure,
+                threads=settings.threads,
             )
-    return surveys
+
+    if kept is None:
+        return [survey_of(source) for source in sources]
+    return [kept.survey(source, budget.rate, settings, survey_of) for source in sources]

@@ -61,6 +61,8 @@ def test_a_mount_of_half_a_turn_about_the_normal_of_the_scans_may_be_a_negated_a
     assert "half a turn about the normal" in (turned_or_negated(found, SCANS_ACROSS_X) or "")
 
 
-@pytest.mark.parametrize("half_turn", [np.diag([1.0, -1.0, -1.0]), np.diag([-1.0, 1.0, -1.0]), PLAIN])
+@pytest.mark.parametrize(
+    "half_turn", [np.diag([1.0, -1.0, -1.0]), np.diag([-1.0, 1.0, -1.0]), PLAIN]
+)
 def test_other_mounts_are_believed(half_turn):
     assert turned_or_negated(SCANS_ACROSS_X @ half_turn, SCANS_ACROSS_X) is None

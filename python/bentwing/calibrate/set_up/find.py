@@ -120,26 +120,31 @@ class _Search:
             start = with_at_least(start, ImuNoise.of(imu))
         if is_plane(points[:: max(1, len(points) // LOOKED_AT)]):
             return self._by_trials(start)
-        found, stretch = self._by_motion(start, self._imu)
-        refinement = Refinement(stretch, found, has_mount=self._has_mount, threads=self._threads)
-        refinement.require_scale_of_ranges()
-        if (held := refinement.found()) is None:
-            raise NotFoundError(refinement.trial.sentence)
+        described, stretch = self._by_motion(start, self._imu)
+        refinements = [
+            Refinement(stretch, found, has_mount=self._has_mount, threads=self._threads)
+            for found in described
+        ]
+        best = next((r for r in refinements if r.trial.is_consistent), refinements[0])
+        best.require_scale_of_ranges()
+        if (held := best.found()) is None:
+            raise NotFoundError(best.trial.sentence)
         return held
 
     def _by_trials(self, start: Payload) -> Payload:
         given = self._given if self._has_mount else None
         return describe_by_trials(self._stretch, start, given, threads=self._threads)
 
-    def _by_motion(self, start: Payload, imu_topic: str) -> tuple[Payload, Stretch]:
+    def _by_motion(self, start: Payload, imu_topic: str) -> tuple[list[Payload], Stretch]:
         turned, stretch = self._turned(start)
         found = describe_by_motion(
             stretch, turned, imu_topic, has_mount=self._has_mount, threads=self._threads
         )
-        if found.encoder is not None and found.lidar.mirrored and not start.lidar.mirrored:
+        likeliest = found[0]
+        if likeliest.encoder is not None and likeliest.lidar.mirrored and not start.lidar.mirrored:
             # A mirrored lidar has seemed to turn the other way.
             return self._by_motion(edits.with_lidar(start, mirrored=True), imu_topic)
-        return _with_zero(turned, found), stretch
+        return [_with_zero(turned, one) for one in found], stretch
 
     def _turned(self, start: Payload) -> tuple[Payload, Stretch]:
         """Return payload and stretch with the joint that turns the lidar, if one does."""

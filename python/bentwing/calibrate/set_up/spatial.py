@@ -17,10 +17,11 @@ from bentwing.recording.readings import GYRO_FACTORS
 from bentwing.recording.sections.imu import Imu
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator
 
     from numpy.typing import NDArray
 
+    from bentwing.calibrate.set_up.explain import Explanation
     from bentwing.calibrate.set_up.hand_eye import AccelFit, GyroFit
     from bentwing.calibrate.set_up.motion import LidarMotion
     from bentwing.calibrate.set_up.stretch import Stretch
@@ -38,8 +39,10 @@ AS_DESCRIBED = np.radians(5.0)
 
 def describe_by_motion(
     stretch: Stretch, payload: Payload, imu_topic: str, *, has_mount: bool, threads: int | None
-) -> Payload:
+) -> list[Payload]:
     """Return the payload with unit, axes, latency and rotation as the lidar's motion shows them.
+
+    Where it hardly shows the axes of the accelerometer, those of the gyro come first.
 
     Parameters
     ----------
@@ -59,17 +62,31 @@ def describe_by_motion(
         raise NotFoundError(_unlike(imu_topic, gyro))
     found = edits.with_latency(_scaled(payload, gyro, imu_topic), gyro.delay)
     described = edits.described_rotation(payload) if has_mount else None
-    explained = [
-        explain(M, _accel_axes(motion, read.imu, gyro.delay, M).C, described) for M in _hands(gyro)
-    ]
-    best = min((e for e in explained if e is not None), key=lambda e: e.cost, default=None)
-    if best is None:
+    likely, others = [], []
+    for M in _hands(gyro):
+        first, *more = _accel_axes(motion, read.imu, gyro.delay, M)
+        likely.append(explain(M, first.C, described))
+        others += [explain(M, fit.C, described) for fit in more]
+    best = [min(e, key=lambda e: e.cost) for e in map(_known, (likely, others)) if e]
+    if not best:
         raise NotFoundError(_no_axes(imu_topic))
-    found = edits.with_axes(found, best.gyro_axes, best.accel_axes)
-    found = edits.with_lidar(found, mirrored=payload.lidar.mirrored ^ best.mirrored)
-    if described is not None and axes.angle_between(best.R_imu_lidar, described) <= AS_DESCRIBED:
+    return [_read_as(found, explanation, described) for explanation in best]
+
+
+def _known(explained: Iterable[Explanation | None]) -> list[Explanation]:
+    return [explanation for explanation in explained if explanation is not None]
+
+
+def _read_as(
+    payload: Payload, explanation: Explanation, described: NDArray[np.float64] | None
+) -> Payload:
+    """Return the payload with axes and mount as an explanation has them."""
+    found = edits.with_axes(payload, explanation.gyro_axes, explanation.accel_axes)
+    found = edits.with_lidar(found, mirrored=payload.lidar.mirrored ^ explanation.mirrored)
+    R = explanation.R_imu_lidar
+    if described is not None and axes.angle_between(R, described) <= AS_DESCRIBED:
         return found
-    return edits.with_rotation(found, best.R_imu_lidar)
+    return edits.with_rotation(found, R)
 
 
 def followed(stretch: Stretch, payload: Payload, threads: int | None) -> LidarMotion:
@@ -103,16 +120,19 @@ def _hands(gyro: GyroFit) -> Iterator[NDArray[np.float64]]:
 
 def _accel_axes(
     motion: LidarMotion, imu: ImuBatch, delay: float, M: NDArray[np.float64]
-) -> AccelFit:
-    """Return the fit of the accelerometer by the axes of the gyro, or by others that are clearly better."""
+) -> list[AccelFit]:
+    """Return the fit of the accelerometer by the axes of the gyro, and by others that are better.
+
+    Where these are clearly better, by these alone.
+    """
     fits = [fit_accel(motion, imu, delay, P @ M) for P in axes.signed_permutations()]
     # Turned about, forces fit as well, but to accelerations the other way.
     fits = [fit for fit in fits if fit.slope > 0.0] or fits
     plain = next((fit for fit in fits if np.array_equal(fit.C, M)), None)
     best = min(fits, key=lambda fit: fit.left)
     if plain is None or best.left < AXES_ARE_CLEAR * plain.left:
-        return best
-    return plain
+        return [best]
+    return [plain] if best is plain else [plain, best]
 
 
 def _scaled(payload: Payload, gyro: GyroFit, imu_topic: str) -> Payload:

@@ -6,6 +6,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import yaml
+from yaml.constructor import ConstructorError
 
 from bentwing.base.regular_file import require_regular
 
@@ -18,13 +19,25 @@ MOST_OF_YAML = 2**20  # bytes; settings and heads have some thousand
 _DEEPEST = 50  # sections in sections
 
 
+class _Loader(yaml.SafeLoader):
+    """Says where a value stands that is not what its form or its tag says: `2024-13-45`, `!!int x`."""
+
+    def construct_object(self, node: yaml.Node, deep: bool = False) -> object:  # noqa: FBT001, FBT002 - as yaml calls it
+        try:
+            return super().construct_object(node, deep)
+        except (ArithmeticError, AttributeError, LookupError, ValueError) as error:
+            kind = node.tag.rsplit(":", 1)[-1]
+            problem = f"{str(node.value)[:40]!r} is no {kind} ({error})"
+            raise ConstructorError(None, None, problem, node.start_mark) from error
+
+
 def parse_yaml(text: str) -> object:
     """Return what a text says.
 
     Raises
     ------
     yaml.YAMLError
-        It is not YAML, repeats parts of itself by aliases, or is nested too deeply.
+        It is not YAML, has values that are none, repeats parts of itself by aliases, or is nested too deeply.
     """
     depth = 0
     # Events come without recursion, and before anything that an alias multiplies is made.
@@ -35,7 +48,7 @@ def parse_yaml(text: str) -> object:
         depth -= isinstance(event, yaml.CollectionEndEvent)
         if depth > _DEEPEST:
             raise _refused(f"more than {_DEEPEST} sections in each other", event)
-    return yaml.safe_load(text)
+    return yaml.load(text, _Loader)
 
 
 def _refused(problem: str, event: yaml.Event) -> yaml.YAMLError:

@@ -18,11 +18,19 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
+    from ezdxf.document import Drawing
+
 DEGREES = 4326
 _GEOJSON = {".geojson", ".json"}
 _MOST_BYTES = 2**26
 _MOST_CORNERS = 1_000_000
+_FARTHEST = 1e9  # m or degrees; coordinates of projected systems have eight digits before the point
 _FLAT = 0.005  # m; how far the chords of an arc may be off it
+_FINEST = 1e-6  # of the size of a line: a drawing in light years has no millimetres
+# What text that is no area, or a damaged drawing, ends in.
+_NO_AREA = (
+    ArithmeticError, AssertionError, AttributeError, LookupError, OSError, RecursionError, TypeError, ValueError,
+)  # fmt: skip
 _DRAWN = {"LWPOLYLINE", "POLYLINE", "CIRCLE", "ELLIPSE", "SPLINE"}
 
 
@@ -64,14 +72,19 @@ def read_area(path: Path) -> AreaFile:
         raise UsageError(msg)
     try:
         found = _drawing(path) if suffix == ".dxf" else _geojson(path)
-    except (AttributeError, LookupError, OSError, RecursionError, TypeError, ValueError) as error:
+    except _NO_AREA as error:
         msg = f"{path}: not readable as an area ({error})"
         raise InputError(msg) from error
     if not found.polygons:
         what = "closed line" if suffix == ".dxf" else "Polygon or MultiPolygon"
         msg = f"{path}: holds no {what}; draw the area as one"
         raise InputError(msg)
-    if sum(len(ring) for p in found.polygons for ring in p.rings) > _MOST_CORNERS:
+    rings = [ring for polygon in found.polygons for ring in polygon.rings]
+    farthest = max(float(np.abs(ring).max()) for ring in rings)
+    if farthest > _FARTHEST:
+        msg = f"{path}: has a corner at {farthest:.3g} m, which is not on Earth; check unit and system"
+        raise InputError(msg)
+    if sum(map(len, rings)) > _MOST_CORNERS:
         msg = f"{path}: has more than {_MOST_CORNERS:,} corners; simplify the area"
         raise InputError(msg)
     return found
@@ -120,10 +133,7 @@ def _system(crs: dict[str, Any] | None) -> int | None:
 def _drawing(path: Path) -> AreaFile:
     try:
         from ezdxf import recover
-        from ezdxf.enums import InsertUnits
         from ezdxf.lldxf.const import DXFError
-        from ezdxf.path import make_path
-        from ezdxf.units import conversion_factor
     except ImportError:
         msg = (
             f"{path}: reading a DXF needs the package ezdxf, which is not installed; run "
@@ -131,10 +141,17 @@ def _drawing(path: Path) -> AreaFile:
         )
         raise UsageError(msg) from None
     try:
-        drawing, _ = recover.readfile(path)
+        return _lines_of(recover.readfile(path)[0])
     except DXFError as error:
         msg = f"no DXF ({error})"
         raise ValueError(msg) from error
+
+
+def _lines_of(drawing: Drawing) -> AreaFile:
+    from ezdxf.enums import InsertUnits
+    from ezdxf.path import make_path
+    from ezdxf.units import conversion_factor
+
     unit = InsertUnits(drawing.units)
     metres = conversion_factor(unit, InsertUnits.Meters) if unit else 1.0
     rings = []
@@ -143,6 +160,8 @@ def _drawing(path: Path) -> AreaFile:
             continue
         line = make_path(entity)
         if line.is_closed:
-            corners = np.array([(p.x, p.y) for p in line.flattening(_FLAT / metres)])
+            reach = np.ptp([(p.x, p.y) for p in line.control_vertices()], axis=0).max()
+            flat = max(_FLAT / metres, _FINEST * float(reach))
+            corners = np.array([(p.x, p.y) for p in line.flattening(flat)])
             rings.append(corners * metres)
     return AreaFile((Polygon(tuple(rings)),) if rings else ())

@@ -136,3 +136,10 @@ def test_without_ezdxf_a_drawing_says_how_to_install_it(tmp_path, monkeypatch):
     (tmp_path / "plan.dxf").touch()
     with pytest.raises(UsageError, match=r"pip install bentwing\[products\]"):
         read_area(tmp_path / "plan.dxf")
+
+
+def test_a_corner_that_is_not_on_earth_is_refused(tmp_path):
+    far = [[0.0, 0.0], [1e12, 0.0], [0.0, 1.0], [0.0, 0.0]]
+    path = written(tmp_path / "far.geojson", {"type": "Polygon", "coordinates": [far]})
+    with pytest.raises(InputError, match="not on Earth"):
+        read_area(path)

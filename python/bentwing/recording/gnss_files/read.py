@@ -17,8 +17,9 @@ from bentwing.recording.gnss_files.nmea import is_nmea, read_nmea
 from bentwing.recording.gnss_files.rtklib import is_rtklib, read_rtklib
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterator
     from pathlib import Path
+    from typing import TextIO
 
     from bentwing.base.clock import Clock
     from bentwing.recording.gnss_files.file_fix import FileFix
@@ -84,8 +85,14 @@ def _read(path: Path, clock: Clock, scale: TimeScale | None, counts: Counter[str
     raise InputError(msg)
 
 
-def _lines(file: Iterable[str]) -> Iterator[str]:
-    return (line for line in file if len(line) <= _LONGEST)
+def _lines(file: TextIO) -> Iterator[str]:
+    """Yield the lines but for those that are too long, of which no more than a part is ever held."""
+    is_inside = False
+    while line := file.readline(_LONGEST):
+        is_whole = not is_inside and (len(line) < _LONGEST or line.endswith("\n"))
+        is_inside = not line.endswith("\n")
+        if is_whole:
+            yield line
 
 
 def _none_of(path: Path, clock: Clock, stamps: np.ndarray, seconds: tuple[float, float]) -> str:

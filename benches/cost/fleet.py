@@ -118,7 +118,13 @@ def main() -> None:
         distributed.Client(cluster) as client,
     ):
         going = zip(ends, list(cluster.workers.values()), strict=False)
-        timers = [threading.Timer(end, _end, (cluster, worker)) for end, worker in going]
+        # Without a word to the scheduler.
+        timers = [
+            threading.Timer(
+                end, cluster.sync, (worker.close,), {"executor_wait": False, "nanny": False}
+            )
+            for end, worker in going
+        ]
         for timer in timers:
             timer.start()
         started, spent = time.monotonic(), time.process_time()
@@ -136,8 +142,3 @@ def main() -> None:
         f"{1e3 * spent / len(work):.2f} ms", f"{peak:.2f} GB", f"{len(work) - len(done)}",
     )  # fmt: skip
     print(tables.line(cells))
-
-
-def _end(cluster: object, worker: object) -> None:
-    """Let a worker go without a word to the scheduler."""
-    cluster.sync(worker.close, executor_wait=False, nanny=False)  # type: ignore[attr-defined]

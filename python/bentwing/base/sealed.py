@@ -34,8 +34,9 @@ def write_sealed(
     path: Path, described: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]
 ) -> None:
     """Write arrays and what JSON says of them, atomically."""
+    stored: dict[str, Any] = {_DESCRIBED: np.array(json.dumps(plain(dict(described)))), **arrays}
     data = io.BytesIO()
-    np.savez(data, **{_DESCRIBED: np.array(json.dumps(plain(dict(described))))}, **arrays)  # type: ignore[arg-type]
+    np.savez(data, **stored)
     content = data.getvalue()
     write_bytes(path, content + hashlib.sha256(content).digest())
 

@@ -19,7 +19,7 @@ from bentwing.run.merging import (
     open_sources,
     settled,
 )
-from bentwing.run.request import deciding, digest_of
+from bentwing.run.request import deciding, digest_of, request_in
 from bentwing.run.run import verdict_in
 
 if TYPE_CHECKING:
@@ -133,7 +133,7 @@ class _Rooms:
 
     def _request(self, members: list[Source], described: dict[str, Any]) -> str:
         """Return the SHA-256 of all that the bytes of a group's map depend on."""
-        runs = [(one.name, (RUN_FOLDER.read(one.folder) or {}).get("request")) for one in members]
+        runs = [(one.name, request_in(RUN_FOLDER.read(one.folder) or {})) for one in members]
         asked = {"settings": deciding(self.settings), "rate": self.rate, "runs": runs}
         return digest_of({**asked, "graph": described["graph"]})
 

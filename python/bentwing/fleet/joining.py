@@ -82,6 +82,9 @@ def join_site(
     known = {resolved(one.folder): one for one in usable_in(record, out) if one.folder is not None}
     folders = list(dict.fromkeys(resolved(path) for path in runs_of(paths)))
     folders.sort(key=lambda folder: folder not in known)  # those that are there keep their names
+    if gone := [one.name for folder, one in known.items() if folder not in folders]:
+        kept = f"to keep them, give {out} among the runs"
+        progress.note(f"no longer in the site: {', '.join(gone)}; {kept}")
     names = distinct_names([known[f].name if f in known else f.name for f in folders])
     runs = [mapped_in(f, n) for f, n in zip(folders, names, strict=True)]
     # Until the new maps are made the site is what it was: who is interrupted can begin again.

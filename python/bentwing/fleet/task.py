@@ -11,7 +11,7 @@ from bentwing.base.provenance import bentwing_version
 from bentwing.base.run_record import RUN_FOLDER, finished_record, understood
 from bentwing.fleet.folder import publish, require_run_or_nothing, staging_of
 from bentwing.fleet.process import Processes, run_unless_done
-from bentwing.run.request import digest_of, record_of_request
+from bentwing.run.request import record_of_request, request_in
 from bentwing.run.run import require_single, verdict_in
 
 if TYPE_CHECKING:
@@ -154,8 +154,7 @@ def _mapped(name: str, folder: Path, record: Mapping[str, Any]) -> Mapped:
             verdict.state,
             reason_of(verdict),
             folder,
-            # Earlier versions did not note what was asked; their bytes stand for it.
-            str(record.get("request") or digest_of(record)),
+            request_in(record),
             float(sum(last - first for first, last in record.get("segments") or [])),
             int((record.get("counts") or {}).get("map.written", 0)),
         )

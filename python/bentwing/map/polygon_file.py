@@ -82,7 +82,9 @@ def read_area(path: Path) -> AreaFile:
     rings = [ring for polygon in found.polygons for ring in polygon.rings]
     farthest = max(float(np.abs(ring).max()) for ring in rings)
     if farthest > _FARTHEST:
-        msg = f"{path}: has a corner at {farthest:.3g} m, which is not on Earth; check unit and system"
+        msg = (
+            f"{path}: has a corner at {farthest:.3g}, which is not on Earth; check unit and system"
+        )
         raise InputError(msg)
     if sum(map(len, rings)) > _MOST_CORNERS:
         msg = f"{path}: has more than {_MOST_CORNERS:,} corners; simplify the area"

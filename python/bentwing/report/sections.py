@@ -56,7 +56,7 @@ def verdict(record: Mapping[str, Any], texts: Texts = ENGLISH) -> str:
 
 
 def _set_up(findings: Sequence[Mapping[str, Any]]) -> str:
-    """Say in what the head is other than the payload says."""
+    """Say what was found of the head that the payload, if there was one, does not say."""
     if not findings:
         return ""
     items = "".join(
@@ -64,8 +64,8 @@ def _set_up(findings: Sequence[Mapping[str, Any]]) -> str:
         for f in findings
     )
     return (
-        "<p>The recording shows another sensor head than the payload describes, and was mapped with it. "
-        f"Correct payload.yaml:</p><ul>{items}</ul>"
+        "<p>The recording shows of the sensor head what no payload told, or told otherwise, and was mapped "
+        f"with it. Write into payload.yaml:</p><ul>{items}</ul>"
     )
 
 

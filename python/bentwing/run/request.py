@@ -48,6 +48,12 @@ def digest_of(asked: Mapping[str, Any]) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
+def request_in(record: Mapping[str, Any]) -> str:
+    """Return the SHA-256 of what was asked of a finished run, from which all of its bytes follow."""
+    # Earlier versions did not note it; what they have found stands for it.
+    return str(record.get("request") or digest_of(record))
+
+
 def inputs_of(paths: Iterable[Path]) -> list[dict[str, Any]]:
     """Return name, size and hash of files, folders standing for theirs."""
     return [describe_input(file) for path in paths for file in files_of(path)]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from bentwing.base import geometry
-from bentwing.calibrate.set_up.mirrors import both_meanings, turned_or_negated
+from bentwing.calibrate.set_up.mirrors import both_meanings
 
 PLAIN = np.eye(3)
 SCANS_ACROSS_Z = PLAIN
@@ -34,7 +34,7 @@ SCANS_ACROSS_X = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
     ],
 )
 def test_both_meanings_are_named(gyro, accel, names):
-    assert re.search(names, both_meanings(gyro, accel, SCANS_ACROSS_Z) or "")
+    assert re.search(names, both_meanings(gyro, accel, SCANS_ACROSS_Z, SCANS_ACROSS_Z) or "")
 
 
 @pytest.mark.parametrize(
@@ -52,17 +52,19 @@ def test_both_meanings_are_named(gyro, accel, names):
     ],
 )
 def test_axes_whose_mirror_image_blames_both_sensors_are_believed(gyro, accel, R):
-    assert both_meanings(gyro, accel, R) is None
+    assert both_meanings(gyro, accel, R, R) is None
 
 
 def test_a_mount_of_half_a_turn_about_the_normal_of_the_scans_may_be_a_negated_accelerometer():
     tilt = geometry.to_matrices(geometry.exp(np.array([[0.02, -0.01, 0.03]])))[0]
     found = SCANS_ACROSS_X @ np.diag([-1.0, -1.0, 1.0]) @ tilt
-    assert "half a turn about the normal" in (turned_or_negated(found, SCANS_ACROSS_X) or "")
+    assert "half a turn about the normal" in (
+        both_meanings(PLAIN, PLAIN, found, SCANS_ACROSS_X) or ""
+    )
 
 
 @pytest.mark.parametrize(
     "half_turn", [np.diag([1.0, -1.0, -1.0]), np.diag([-1.0, 1.0, -1.0]), PLAIN]
 )
 def test_other_mounts_are_believed(half_turn):
-    assert turned_or_negated(SCANS_ACROSS_X @ half_turn, SCANS_ACROSS_X) is None
+    assert both_meanings(PLAIN, PLAIN, SCANS_ACROSS_X @ half_turn, SCANS_ACROSS_X) is None

@@ -8,7 +8,7 @@ import json
 import pytest
 
 from bentwing.base.errors import UsageError
-from bentwing.base.progress import Progress
+from bentwing.base.progress import LineProgress, Progress
 from bentwing.fleet.joining import join_site, runs_of
 from bentwing.fleet.opened import side_by_side
 from bentwing.fleet.plan import Choice
@@ -55,8 +55,10 @@ def test_a_further_run_joins_its_group_and_nothing_is_mapped(site, join, work, t
     assert not work.calls
 
 
-def test_the_runs_that_are_given_remain(site, join, work):
-    found = join(site / "recordings" / "a2", site / "recordings" / "b1")
+def test_the_runs_that_are_given_remain_and_the_others_are_named(site, work, capsys):
+    given = [site / "recordings" / "a2", site / "recordings" / "b1"]
+    found = join_site(given, site, {}, side_by_side(None, Progress()), LineProgress())
+    assert "no longer in the site: a1; to keep them" in capsys.readouterr().err
     assert groups(found) == [("a2",), ("b1",)]
     assert set(work.calls) == {"merge"}
     assert (site / "recordings" / "a1" / "map.laz").is_file()

@@ -190,3 +190,7 @@ def test_gps_time_is_ahead_of_utc_by_the_leap_seconds_until_then(day, leap):
     utc = int(datetime.fromisoformat(day).replace(tzinfo=timezone.utc).timestamp()) * 10**9
     assert leap_seconds(utc) == leap
     assert utc_of_gps_ns(utc + (leap - 315_964_800) * 10**9) == utc
+
+
+def test_a_line_without_end_is_left_out_and_the_next_one_read(read):
+    assert read(HEAD + row(1) + 10_000 * "7" + "\n" + row(2)).times.tolist() == [1.25, 2.25]

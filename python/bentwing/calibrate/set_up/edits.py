@@ -59,6 +59,11 @@ def with_axes(payload: Payload, gyro: NDArray[np.float64], accel: NDArray[np.flo
     return with_imu(payload, axes=axes.named(accel), gyro_axes=own)
 
 
+def axes_of(imu: Imu) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the axes (3, 3) of gyro and accelerometer."""
+    return axes.of(imu.gyro_axes or imu.axes), axes.of(imu.axes)
+
+
 def with_latency(payload: Payload, latency: float) -> Payload:
     """Return the payload with a latency, s; of clocks that are not one it goes to the IMU's."""
     offset = 0.0 if payload.imu is None else payload.imu.clock_offset

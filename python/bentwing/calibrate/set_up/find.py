@@ -125,7 +125,7 @@ class _Search:
             Refinement(stretch, found, has_mount=self._has_mount, threads=self._threads)
             for found in described
         ]
-        best = next((r for r in refinements if r.trial.is_consistent), refinements[0])
+        best = _best(refinements)
         best.require_scale_of_ranges()
         if (held := best.found()) is None:
             raise NotFoundError(best.trial.sentence)
@@ -158,6 +158,15 @@ class _Search:
         angles = joints[found.encoder.joint, found.encoder.unit]
         signed = EncoderBatch(angles.times, found.encoder.sign * angles.angles)
         return found, self._stretch.with_encoder(signed)
+
+
+def _best(refinements: Sequence[Refinement]) -> Refinement:
+    """Return the first that holds without strain, else the least strained that holds, else the first."""
+    for refinement in refinements:
+        if refinement.trial.is_consistent and not refinement.trial.is_strained:
+            return refinement
+    holding = [r for r in refinements if r.trial.is_consistent]
+    return min(holding, key=lambda r: r.trial.force, default=refinements[0])
 
 
 def _require_motion(imu: ImuBatch) -> None:

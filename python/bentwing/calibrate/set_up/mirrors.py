@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 ALONG = 0.9  # cosine between the normal of the scans and an axis of the IMU that is about the same
 SAME_TURN = 0.2  # rad between mounts that are about the same
+_HALF_TURN = np.diag([-1.0, -1.0, 1.0])  # about the normal of the scans
 _POINT = (
     "either the lidar is mounted with half a turn about the normal of its scan plane, or all axes of the "
     "accelerometer are negated; a 2D lidar sees both alike: turn T_imu_lidar, or write imu: "
@@ -34,15 +35,26 @@ _PLANE = (
 
 
 def both_meanings(
-    gyro: NDArray[np.float64], accel: NDArray[np.float64], R: NDArray[np.float64]
+    gyro: NDArray[np.float64],
+    accel: NDArray[np.float64],
+    R: NDArray[np.float64],
+    described: NDArray[np.float64],
 ) -> str | None:
-    """Say what axes that fit may mean, if others are as likely with which all is mirrored.
+    """Say what a set-up that fits may mean, if one with which all is mirrored is as likely.
 
     Parameters
     ----------
     gyro, accel : (3, 3) axes of both
-    R : (3, 3) rotation of the lidar in the IMU
+    R, described : (3, 3) rotations of the lidar in the IMU, as it fits and as the payload has it
     """
+    if axes.angle_between(described @ _HALF_TURN, R) < SAME_TURN:
+        return _POINT
+    return _of_axes(gyro, accel, R) if axes.angle_between(described, R) < SAME_TURN else None
+
+
+def _of_axes(
+    gyro: NDArray[np.float64], accel: NDArray[np.float64], R: NDArray[np.float64]
+) -> str | None:
     plain = np.eye(3)
     if np.array_equal(accel, -plain) and np.array_equal(gyro, plain):
         return _POINT
@@ -55,17 +67,6 @@ def both_meanings(
         f"either {_told(gyro, accel)}, or {_told(*other)}; a 2D lidar sees both alike: write imu: "
         f"{_line(gyro, accel)}, or imu: {_line(*other)}"
     )
-
-
-def turned_or_negated(found: NDArray[np.float64], described: NDArray[np.float64]) -> str | None:
-    """Say what a mount that fits may mean, if as described it is one with which all is mirrored.
-
-    Parameters
-    ----------
-    found, described : (3, 3) rotations of the lidar in the IMU
-    """
-    half_turn = np.diag([-1.0, -1.0, 1.0])
-    return _POINT if axes.angle_between(described @ half_turn, found) < SAME_TURN else None
 
 
 def _mirrored(

@@ -16,7 +16,7 @@ from bentwing.calibrate.set_up import axes, edits
 from bentwing.calibrate.set_up.crossings import Crossings, Reading
 from bentwing.calibrate.set_up.delays import likely_delays
 from bentwing.calibrate.set_up.errors import NotFoundError
-from bentwing.calibrate.set_up.mirrors import both_meanings, turned_or_negated
+from bentwing.calibrate.set_up.mirrors import both_meanings
 from bentwing.calibrate.set_up.scans import Scans
 from bentwing.calibrate.set_up.trials import Trials
 from bentwing.odometry.imu_noise import ImuNoise
@@ -78,9 +78,7 @@ def describe_by_trials(
             return found
         for gyro, accel in descriptions.of_axes(described):
             if found := trials.at_a_glance(edits.with_axes(likely, gyro, accel)):
-                if doubt := both_meanings(gyro, accel, described):
-                    raise NotFoundError(doubt)
-                return found
+                return _not_mirrored(found, described)
     unmounted = delays[: LIKELY_UNMOUNTED if given is None else 1]
     mounted = itertools.chain(*map(descriptions.of_mounts, unmounted))
     others = itertools.chain(mounted, delayed[LIKELY:])
@@ -93,9 +91,17 @@ def describe_by_trials(
 
 
 def _not_mirrored(found: Payload, described: NDArray[np.float64] | None) -> Payload:
-    """Return what was found, if it is not the mount as described in a mirrored world."""
+    """Return what was found, if no mirror image of it is as likely.
+
+    Raises
+    ------
+    NotFoundError
+        One is.
+    """
     R = edits.described_rotation(found)
-    if described is not None and R is not None and (doubt := turned_or_negated(R, described)):
+    if described is None or R is None or found.imu is None:
+        return found
+    if doubt := both_meanings(*edits.axes_of(found.imu), R, described):
         raise NotFoundError(doubt)
     return found
 

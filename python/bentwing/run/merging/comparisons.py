@@ -22,7 +22,7 @@ from bentwing.closing.joining.stored import (
     write_comparison,
     write_survey,
 )
-from bentwing.run.request import digest_of
+from bentwing.run.request import digest_of, request_in
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -103,10 +103,8 @@ class Comparisons:
     def remove_others(self) -> None:
         """Remove what this merging had no use for, as of runs that were left out."""
         for path in self._folder.iterdir():
-            is_ours = path.suffix in {
-                _SUFFIX,
-                TEMPORARY_SUFFIX,
-            }  # also of a process that was killed
+            # What is half-written is of a process that was killed.
+            is_ours = path.suffix in (_SUFFIX, TEMPORARY_SUFFIX)
             if is_ours and path.name not in self._used:
                 path.unlink(missing_ok=True)
 
@@ -125,6 +123,4 @@ def _named(path: Path) -> Iterator[Path]:
 
 
 def _request(source: Source) -> str:
-    """Return what the run was asked for, from which all of its bytes follow."""
-    record = RUN_FOLDER.read(source.folder) or {}
-    return str(record.get("request") or digest_of(record))  # earlier versions did not note it
+    return request_in(RUN_FOLDER.read(source.folder) or {})

@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from bentwing.base.array_spool import ArraySpool, columns_of
 from bentwing.base.memory import give_back
@@ -23,6 +22,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from numpy.typing import NDArray
+    from scipy.spatial import cKDTree
 
     from bentwing.map.voxel_views import Views
 
@@ -94,6 +94,8 @@ def find_normals(views: Views, spacing: float) -> tuple[Array, NDArray[np.bool_]
 
     Neighbours that were seen from the opposite direction are of the other side of a thin wall.
     """
+    from scipy.spatial import cKDTree  # slow to import, and few maps have normals
+
     tree = cKDTree(views.points)
     normals, known = np.empty_like(views.points), np.empty(len(views.points), np.bool_)
     for first in range(0, len(normals), _TOGETHER):

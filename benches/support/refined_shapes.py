@@ -15,6 +15,7 @@ from bentwing.map.refine import refine
 
 NOISE, DURATION = 0.01, 30.0
 DENSITY = 5000  # points per m²
+N_DRAWS = 5  # of each step
 STEPS = (0.005, 0.01, 0.02, 0.03, 0.05)
 RADII = (0.05, 0.1, 0.2, 0.4)
 PLATES = (0.02, 0.04, 0.06)
@@ -53,20 +54,26 @@ def width(along, heights, rise: float) -> float:
 
 
 def step(height: float, rng) -> list[str]:
+    draws = [_drawn_step(height, rng) for _ in range(N_DRAWS)]
+    cells = [
+        f"{1e3 * kept:.1f} mm, {1e3 * wide:.0f} mm wide" for kept, wide in np.mean(draws, axis=0)
+    ]
+    return [f"step of {1e3 * height:.0f} mm", *cells]
+
+
+def _drawn_step(height: float, rng) -> list[tuple[float, float]]:
+    """Height and width, m, of the points as measured and as refined."""
     n = 4 * DENSITY
     true = np.c_[rng.uniform(-1, 1, (n, 2)), np.zeros(n)]
     true[true[:, 0] > 0, 2] = height
     chunk = measured(true, above(n, rng), rng)
-    found = refined(chunk)
-    cells = []
-    for points in (chunk.points, found):
+    found = []
+    for points in (chunk.points, refined(chunk)):
         near = np.abs(points[:, 0]) < 0.06
         up, down = near & (points[:, 0] > 0.01), near & (points[:, 0] < -0.01)
         kept = points[up, 2].mean() - points[down, 2].mean()
-        cells.append(
-            f"{1e3 * kept:.1f} mm, {1e3 * width(points[:, 0], points[:, 2], height):.0f} mm wide"
-        )
-    return [f"step of {1e3 * height:.0f} mm", *cells]
+        found.append((kept, width(points[:, 0], points[:, 2], height)))
+    return found
 
 
 def crease(rng, *, convex: bool) -> list[str]:

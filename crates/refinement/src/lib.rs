@@ -2,6 +2,7 @@
 #![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
+mod gather;
 mod grid;
 mod noise;
 mod piece;
@@ -11,6 +12,8 @@ mod sample;
 mod sheet;
 mod split;
 mod spots;
+mod step;
+mod steps;
 mod surfaces;
 
 pub use noise::Noise;

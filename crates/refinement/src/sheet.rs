@@ -26,6 +26,8 @@ const STEEP: f64 = 0.1;
 const STEEPEST: f64 = 0.8;
 const NARROWEST: f64 = 0.75;
 const PLANE: usize = 3;
+/// A height, and half of the slopes that two planes share.
+const LEVEL: usize = 2;
 const QUADRIC: usize = 6;
 /// A surface cannot be told from another one that a beam meets at less than this cosine.
 pub(crate) const GRAZING: f32 = 0.05;
@@ -93,6 +95,8 @@ enum Kind {
     Any,
     /// A quadric.
     Bent,
+    /// A plane with this normal, one of two that share it.
+    Level,
 }
 
 impl Sheet {
@@ -104,6 +108,16 @@ impl Sheet {
         room: &mut Room,
     ) -> Option<Self> {
         Self::fit_as(spots, radius, normal, Kind::Any, room)
+    }
+
+    /// The plane with this normal through spots beside those of another one with it.
+    pub(crate) fn level(
+        spots: &[Spot],
+        radius: f64,
+        normal: &Vector3<f64>,
+        room: &mut Room,
+    ) -> Option<Self> {
+        Self::fit_as(spots, radius, normal, Kind::Level, room)
     }
 
     /// The same within a radius that a quadric can follow, where this one bends more.
@@ -143,14 +157,14 @@ impl Sheet {
         sheet.put(spots, locals);
         let mut sums = Sums::of(locals);
         let first = sums.plane()?;
-        if first.fixed_rows::<2>(1).norm() > STEEP * radius {
+        if kind != Kind::Level && first.fixed_rows::<2>(1).norm() > STEEP * radius {
             sheet.turn(&first);
             sheet.put(spots, locals);
             sums = Sums::of(locals);
         }
         let mut robust = false;
         for round in 0.. {
-            if !sums.is_wide() {
+            if kind != Kind::Level && !sums.is_wide() {
                 return None;
             }
             sheet.choose(&sums, kind)?;
@@ -228,6 +242,11 @@ impl Sheet {
     /// Plane or quadric, by Akaike's information criterion: a curve that is too weak for the Bayesian one
     /// would still shift a cylinder by a millimetre. A quadric where the points are known to bend.
     fn choose(&mut self, sums: &Sums, kind: Kind) -> Option<()> {
+        if kind == Kind::Level {
+            self.heights[0] = sums.height()?;
+            self.n_parameters = LEVEL;
+            return Some(());
+        }
         let plane = sums.plane()?;
         (self.heights, self.n_parameters) = (plane, PLANE);
         let freedom = sums.n - QUADRIC as f64;
@@ -291,9 +310,13 @@ impl Sheet {
         self.variance = parameters * spread / self.n_points + shared / self.n_passes;
     }
 
-    /// Of a spot.
-    pub(crate) fn mean_cost(&self) -> f64 {
-        self.cost / self.weight
+    pub(crate) fn is_bent(&self) -> bool {
+        self.n_parameters == QUADRIC
+    }
+
+    /// By how many standard deviations the residuals are larger than noise makes them.
+    pub(crate) fn excess(&self) -> f64 {
+        (self.cost / self.weight - 1.0) / (2.0 / self.n_points.max(1.0)).sqrt()
     }
 
     /// Finds the residuals over their standard deviations, and the largest one.
@@ -420,6 +443,11 @@ impl Sums {
         let half = 0.5 * (uu + vv);
         let smaller = half - (0.25 * (uu - vv) * (uu - vv) + uv * uv).sqrt();
         smaller > (2.0 * MIN_WIDTH) * (2.0 * MIN_WIDTH)
+    }
+
+    fn height(&self) -> Option<f64> {
+        let weight = self.matrix[(0, 0)];
+        (weight > 0.0).then(|| self.right[0] / weight)
     }
 
     fn plane(&self) -> Option<Vector6<f64>> {

@@ -16,7 +16,7 @@ const N_BINS: usize = 10;
 const N_STRIPS: usize = 64;
 /// Each side has at least this share of the weights, and so many points.
 const SMALLEST: f64 = 0.12;
-const FEWEST: usize = 8;
+pub(crate) const FEWEST: usize = 8;
 /// Normals that differ by more are those of a crease, whose line both planes tell.
 const CREASE: f64 = 0.15;
 /// Parameters of the line.
@@ -24,7 +24,7 @@ const LINE: usize = 2;
 /// Two planes are tried where they explain more than this, in logarithms of the number of spots.
 const PROMISING: f64 = 2.0;
 /// Share of the spread of spots along and across that shows a direction of its own.
-const FLAT: f64 = 1e-6;
+pub(crate) const FLAT: f64 = 1e-6;
 /// Turns of the line of a step that are tried once more, rad.
 const TURNS: [f64; 5] = [-0.2, -0.1, 0.0, 0.1, 0.2];
 
@@ -37,11 +37,18 @@ pub(crate) struct Half {
 
 impl Half {
     #[inline]
-    fn holds(&self, at: &[f32; 3]) -> bool {
+    pub(crate) fn holds(&self, at: &[f32; 3]) -> bool {
         dot(&single(&self.direction), at) >= self.offset as f32
     }
 
-    fn other(&self) -> Self {
+    /// As it is from another middle than the one it is told from (units of the map, each of them in m).
+    pub(crate) fn seen_from(&self, own: &[i32; 3], other: &[i32; 3], unit: f32) -> Self {
+        let apart = [0, 1, 2].map(|a| f64::from(unit) * f64::from(own[a].wrapping_sub(other[a])));
+        let offset = self.offset + self.direction.dot(&Vector3::from(apart));
+        Self { offset, ..*self }
+    }
+
+    pub(crate) fn other(&self) -> Self {
         Self {
             direction: -self.direction,
             offset: -self.offset,
@@ -62,7 +69,10 @@ pub(crate) fn split(
 ) -> Option<Pair> {
     let coarse = best_line(spots, radius, normal)?;
     let pair = fit_halves(spots, radius, coarse, room)?;
-    let lines = [crease(&pair), step(spots, radius, &pair, normal, room)];
+    let lines = [
+        crease(&pair),
+        line_between(spots, radius, &pair, normal, room),
+    ];
     let others = lines
         .into_iter()
         .flatten()
@@ -74,21 +84,20 @@ pub(crate) fn split(
             best
         }
     });
-    is_better(&pair, one).then_some(pair)
+    one.is_none_or(|one| gain(&pair, one) > 0.0).then_some(pair)
 }
 
-fn cost(pair: &Pair) -> f64 {
+pub(crate) fn cost(pair: &Pair) -> f64 {
     pair[0].0.cost + pair[1].0.cost
 }
 
-/// Bayesian information criterion.
-fn is_better(pair: &Pair, one: Option<&Sheet>) -> bool {
-    let Some(one) = one else { return true };
-    let n = one.weight;
+/// By how much two sheets are likelier than one, by the Bayesian information criterion: as so many parameters.
+pub(crate) fn gain(pair: &Pair, one: &Sheet) -> f64 {
+    let n = one.weight.max(1.0);
+    let left = (cost(pair) / n).max(1.0);
     let parameters = pair[0].0.n_parameters + pair[1].0.n_parameters + LINE;
-    let left = (cost(pair) / n.max(1.0)).max(1.0);
-    let price = (parameters as f64 - one.n_parameters as f64) * n.max(1.0).ln();
-    (one.cost - cost(pair)) / left > price
+    let explained = (one.cost - cost(pair)) / left;
+    explained / n.ln().max(f64::MIN_POSITIVE) + one.n_parameters as f64 - parameters as f64
 }
 
 fn fit_halves(spots: &mut [Spot], radius: f64, half: Half, room: &mut Room) -> Option<Pair> {
@@ -102,7 +111,7 @@ fn fit_halves(spots: &mut [Spot], radius: f64, half: Half, room: &mut Room) -> O
 
 /// The line that leaves two planes with the least squares, unless even they explain the spots hardly better
 /// than one does.
-fn best_line(spots: &[Spot], radius: f64, normal: &Vector3<f64>) -> Option<Half> {
+pub(crate) fn best_line(spots: &[Spot], radius: f64, normal: &Vector3<f64>) -> Option<Half> {
     let [u, v] = so3::orthogonal_pair(normal);
     let [along, beside, up] = [u / radius, v / radius, *normal].map(|axis| single(&axis));
     // In small squares first, of which each side of a line has some.
@@ -158,8 +167,8 @@ fn middle_of(bin: usize) -> f32 {
     (2 * bin + 1) as f32 / N_BINS as f32 - 1.0
 }
 
-/// The line of a step between two sheets, which leaves each spot on the one that it fits.
-fn step(
+/// The line between two sheets that leaves each spot on the one that it fits.
+pub(crate) fn line_between(
     spots: &[Spot],
     radius: f64,
     pair: &Pair,
@@ -213,10 +222,10 @@ fn crease(pair: &Pair) -> Option<Half> {
 ///
 /// The weights by the distance; these over the variances, alone and times u, v, h, uu, uv, vv, uh, vh, hh.
 #[derive(Clone, Copy, Default)]
-struct Sums([f32x4; 3]);
+pub(crate) struct Sums([f32x4; 3]);
 
 impl Sums {
-    fn add(&mut self, u: f32, v: f32, s: &Spot, normal: &[f32; 3]) {
+    pub(crate) fn add(&mut self, u: f32, v: f32, s: &Spot, normal: &[f32; 3]) {
         let h = dot(normal, &s.at);
         let across = dot(normal, &s.beam).abs().max(GRAZING) * s.sigma;
         let near = (1.0 - u * u - v * v).max(0.0);
@@ -234,7 +243,7 @@ impl Sums {
         f64::from(self.0[0].to_array()[0])
     }
 
-    fn w(&self) -> f64 {
+    pub(crate) fn w(&self) -> f64 {
         f64::from(self.0[0].to_array()[1])
     }
 
@@ -250,13 +259,7 @@ impl Sums {
 
     /// Squares of the heights over the best plane, over their variances.
     fn misfit(&self) -> f64 {
-        let w = self.w();
-        let per = 1.0 / w;
-        let per_weight = |k: usize| self.0[k].to_array().map(|s| f64::from(s) * per);
-        let ([_, _, u, v], [h, uu, uv, vv], [uh, vh, hh, _]) =
-            (per_weight(0), per_weight(1), per_weight(2));
-        let (uu, uv, vv) = (uu - u * u, uv - u * v, vv - v * v);
-        let (uh, vh, hh) = (uh - u * h, vh - v * h, hh - h * h);
+        let [uu, uv, vv, uh, vh, hh] = self.variances();
         let determinant = uu * vv - uv * uv;
         // What lies on a line leaves one slope free.
         let explained = if determinant > FLAT * uu * vv {
@@ -264,7 +267,16 @@ impl Sums {
         } else {
             0.0
         };
-        (hh - explained).max(0.0) * w
+        (hh - explained).max(0.0) * self.w()
+    }
+
+    /// Means of uu, uv, vv, uh, vh and hh, all from their own means.
+    pub(crate) fn variances(&self) -> [f64; 6] {
+        let per = 1.0 / self.w();
+        let mean = |k: usize| self.0[k].to_array().map(|s| f64::from(s) * per);
+        let ([_, _, u, v], [h, uu, uv, vv], [uh, vh, hh, _]) = (mean(0), mean(1), mean(2));
+        let (uu, uv, vv) = (uu - u * u, uv - u * v, vv - v * v);
+        [uu, uv, vv, uh - u * h, vh - v * h, hh - h * h]
     }
 }
 

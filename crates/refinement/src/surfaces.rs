@@ -6,18 +6,17 @@ use std::ops::Range;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-use crate::grid::{Level, N_AROUND, NONE, beside};
+use crate::gather::{Bench, Surroundings, UNIT};
+use crate::grid::{Level, NONE, beside};
 use crate::noise::Noise;
 use crate::piece::Piece;
-use crate::sample::{Shot, Sorted};
+use crate::sample::Sorted;
 use crate::sheet::{Room, Sheet};
 use crate::split::{Half, split};
-use crate::spots::{NO_SPOT, Spot, dot, normal_of, partition, single};
+use crate::spots::{Spot, dot, normal_of, partition, single};
+use crate::step::planes_beside;
+use crate::steps::{CHUNK, Steps};
 
-/// Points around a middle are used up to so many edges away, with less and less weight.
-const REACH: f64 = 1.5;
-/// More points of a cell's surroundings are thinned.
-const MOST_SPOTS: usize = 200;
 /// Fewer points of one side are no sheet.
 const FEWEST_SPOTS: usize = 8;
 /// One of so many cells is looked at to learn the noise, and no more cells of a size than about so many.
@@ -25,25 +24,8 @@ const NOISE_EVERY: usize = 8;
 const MOST_CELLS: usize = 8192;
 /// The noise is read where beams meet a sheet at more than this cosine, m.
 const NOISE_COSINE: f32 = 0.5;
-/// Cells per parallel task; fixed, so that results do not depend on the number of threads.
-const CHUNK: usize = 64;
 /// Residuals beyond this many standard deviations of what noise alone would make show a second sheet.
 const SUSPICIOUS: f64 = 1.5;
-
-/// Where a task puts the spots of one cell after the other.
-struct Bench {
-    spots: [Spot; MOST_SPOTS],
-    room: Room,
-}
-
-impl Default for Bench {
-    fn default() -> Self {
-        Self {
-            spots: [NO_SPOT; MOST_SPOTS],
-            room: Room::default(),
-        }
-    }
-}
 
 /// The sheets of the cells of one size.
 #[derive(Clone, Debug)]
@@ -104,17 +86,20 @@ impl Layer {
 /// The sheets of all sizes of cells; those that smaller ones cover have none.
 pub(crate) fn layers_of(sorted: &Sorted, noise: &Noise) -> Vec<Layer> {
     let mut open = wanted(sorted);
-    let of_level = |level: &Level| {
-        let cells: Vec<usize> = (0..level.n_cells())
-            .filter(|&place| level.points(level.in_rows(place)).any(|i| open[i]))
-            .collect();
+    let of_level = |(number, level): (usize, &Level)| {
+        let cells = open_cells(level, &open);
+        let wider = sorted.levels.get(number + 1);
+        let steps = wider.map(|wider| Steps::of(sorted, wider, &open_cells(wider, &open), noise));
         let found: Vec<Vec<Found>> = cells
             .par_chunks(CHUNK)
-            .map_init(Bench::default, |bench, places| {
+            .map_init(<[Bench; 2]>::default, |[bench, of_step], places| {
                 let mut around = level.around(places[0]);
                 let of_cell = |&place: &usize| {
                     let (number, around) = (level.in_rows(place), around.of(place));
-                    let pieces = pieces_of(sorted, level, number, &around, noise, bench);
+                    let here = Surroundings::of(sorted, level, number, &around);
+                    let point = level.points(number).start;
+                    let mut line = || steps.as_ref()?.near(&here, point, noise, of_step);
+                    let pieces = pieces_of(&here, &mut line, noise, bench);
                     let beside = beside(&around);
                     (!pieces.is_empty()).then_some(Found {
                         number,
@@ -130,7 +115,13 @@ pub(crate) fn layers_of(sorted: &Sorted, noise: &Noise) -> Vec<Layer> {
         }
         Layer::of(level, found.into_iter().flatten())
     };
-    sorted.levels.iter().map(of_level).collect()
+    sorted.levels.iter().enumerate().map(of_level).collect()
+}
+
+/// Places among the rows of the cells that no smaller ones cover.
+fn open_cells(level: &Level, open: &[bool]) -> Vec<usize> {
+    let is_open = |&place: &usize| level.points(level.in_rows(place)).any(|i| open[i]);
+    (0..level.n_cells()).filter(is_open).collect()
 }
 
 /// Whether each point is in or beside one of the largest cells that have a point to be refined: no other
@@ -179,94 +170,36 @@ pub(crate) fn noise_of(sorted: &Sorted) -> Option<Noise> {
 fn residual(sorted: &Sorted, level: &Level, place: usize, bench: &mut Bench) -> Option<(u8, f64)> {
     let cell = level.in_rows(place);
     let around = level.around(place).of(place);
-    let (_, radius, n) = gather(sorted, level, cell, &around, None, &mut bench.spots)?;
-    let spots = &mut bench.spots[..n];
+    let here = Surroundings::of(sorted, level, cell, &around);
+    let (spots, room) = here.spots(None, bench)?;
     let normal = normal_of(spots)?;
     let row = single(&normal);
     let [steep, _] = partition(spots, |s| dot(&row, &s.beam) < -NOISE_COSINE);
     if steep.len() < sorted.settings.enough / 2 {
         return None;
     }
-    let sheet = Sheet::fit(steep, radius, &normal, &mut bench.room)?;
+    let sheet = Sheet::fit(steep, here.radius(), &normal, room)?;
     let own = level.points(cell);
     let step = sorted.shots[own.start + own.len() / 2].step;
     (sheet.n_passes >= sorted.settings.fewest_passes).then_some((step, sheet.scale.sqrt() * UNIT))
 }
 
-/// Of a range where the noise is not known, m.
-const UNIT: f64 = 0.002;
-
-/// The points around the middle of a cell's points; the middle (units of the map), and the radius (m) within
-/// which they are, and their number.
-fn gather(
-    sorted: &Sorted,
-    level: &Level,
-    cell: u32,
-    around: &[u32; N_AROUND],
-    noise: Option<&Noise>,
-    spots: &mut [Spot; MOST_SPOTS],
-) -> Option<([i32; 3], f64, usize)> {
-    let around = around.iter().filter(|&&c| c != NONE);
-    let total: usize = around.clone().map(|&c| level.points(c).len()).sum();
-    if total < sorted.settings.enough {
-        return None;
-    }
-    let middle = middle_of(&sorted.shots[level.points(cell)]);
-    let (unit, radius) = (sorted.unit(), REACH * level.edge);
-    let most = (radius * radius) as f32;
-    let mut n = 0;
-    let every = total.div_ceil(MOST_SPOTS);
-    let mut skipped = 0;
-    for &cell in around {
-        let points = level.points(cell);
-        for shot in sorted.shots[points.clone()]
-            .iter()
-            .skip(skipped)
-            .step_by(every)
-        {
-            let at = shot.from(&middle).map(|c| c * unit);
-            spots[n] = Spot {
-                at,
-                beam: shot.beam(),
-                sigma: noise.map_or(UNIT, |n| n.of_step(shot.step)) as f32,
-                pass: shot.pass,
-            };
-            // Whether it is near is as good as random: a branch would be guessed wrong.
-            n += usize::from(dot(&at, &at) < most);
-        }
-        // As if the points of all cells were one behind the other.
-        skipped = (skipped + every - points.len() % every) % every;
-    }
-    (n * every.min(2) >= sorted.settings.enough / 2).then_some((middle, radius, n))
-}
-
-/// Of some shots, at least one.
-fn middle_of(shots: &[Shot]) -> [i32; 3] {
-    let first = shots[0].at;
-    let sum = shots.iter().fold([0_i64; 3], |sum, shot| {
-        [0, 1, 2].map(|a| sum[a] + i64::from(shot.at[a].wrapping_sub(first[a])))
-    });
-    [0, 1, 2].map(|a| first[a].wrapping_add((sum[a] / shots.len() as i64) as i32))
-}
-
 fn pieces_of(
-    sorted: &Sorted,
-    level: &Level,
-    cell: u32,
-    around: &[u32; N_AROUND],
+    here: &Surroundings,
+    line: &mut dyn FnMut() -> Option<Half>,
     noise: &Noise,
     bench: &mut Bench,
 ) -> Vec<Piece> {
-    let Bench { spots, room } = bench;
-    let Some((middle, radius, n)) = gather(sorted, level, cell, around, Some(noise), spots) else {
+    let (settings, radius) = (&here.sorted.settings, here.radius());
+    let Some((spots, room)) = here.spots(Some(noise), bench) else {
         return Vec::new();
     };
-    let Some(normal) = normal_of(&spots[..n]) else {
+    let (n, Some(normal)) = (spots.len(), normal_of(spots)) else {
         return Vec::new();
     };
     // Those that beams meet from behind are of another side.
     let row = single(&normal);
-    let sides = partition(&mut spots[..n], |s| dot(&row, &s.beam) <= 0.0);
+    let sides = partition(spots, |s| dot(&row, &s.beam) <= 0.0);
     let mut pieces = Vec::new();
     for side in sides.into_iter().filter(|side| side.len() >= FEWEST_SPOTS) {
         let own = if side.len() == n {
@@ -274,35 +207,35 @@ fn pieces_of(
         } else {
             normal_of(side)
         };
-        for (sheet, half) in own.map_or(Vec::new(), |normal| sheets_of(side, radius, &normal, room))
-        {
-            if sheet.n_passes >= sorted.settings.fewest_passes
-                && sheet.n_points >= FEWEST_SPOTS as f64
-            {
-                pieces.push(Piece::of(middle, &sheet, half.as_ref()));
+        let sheets = own.map_or(Vec::new(), |n| sheets_of(side, radius, &n, line, room));
+        for (sheet, half) in sheets {
+            if sheet.n_passes >= settings.fewest_passes && sheet.n_points >= FEWEST_SPOTS as f64 {
+                pieces.push(Piece::of(here.middle, &sheet, half.as_ref()));
             }
         }
     }
     pieces
 }
 
-/// One sheet, or two where that is more likely; `normal` is a guess.
+/// One sheet, or two where that is more likely or where the line of a step is known; `normal` is a guess.
 fn sheets_of(
     spots: &mut [Spot],
     radius: f64,
     normal: &Vector3<f64>,
+    line: &mut dyn FnMut() -> Option<Half>,
     room: &mut Room,
 ) -> Vec<(Sheet, Option<Half>)> {
     let one = Sheet::fit(spots, radius, normal, room);
-    if one.as_ref().is_none_or(is_suspicious)
-        && let Some(pair) = split(spots, radius, normal, one.as_ref(), room)
-    {
+    let mut pair = None;
+    if one.as_ref().is_none_or(|one| one.excess() > SUSPICIOUS) {
+        pair = split(spots, radius, normal, one.as_ref(), room);
+    }
+    if pair.is_none() && one.is_some() {
+        pair = line().and_then(|line| planes_beside(line, spots, radius, normal, room));
+    }
+    if let Some(pair) = pair {
         return pair.map(|(sheet, half)| (sheet, Some(half))).to_vec();
     }
     let one = one.map(|sheet| sheet.narrower(spots, room).unwrap_or(sheet));
     one.map(|sheet| (sheet, None)).into_iter().collect()
-}
-
-fn is_suspicious(sheet: &Sheet) -> bool {
-    sheet.mean_cost() > 1.0 + SUSPICIOUS * (2.0 / sheet.n_points.max(1.0)).sqrt()
 }

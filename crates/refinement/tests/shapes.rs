@@ -197,6 +197,21 @@ fn the_step_of_20_mm_stays_and_its_sides_are_flat() {
     }
 }
 
+#[test]
+fn a_step_of_twice_the_noise_stays_sharp() {
+    let (edge, height) = (0.013, 0.02);
+    let step = |r: &mut Random| {
+        let p = floor(r, 1.0);
+        [p[0], p[1], if p[0] > edge { height } else { 0.0 }]
+    };
+    let moved = map_of(20_000, step, above).moved();
+    let mean = |side: f64| {
+        let off = |p: &&Point| (0.003..0.015).contains(&(side * (p[0] - edge)));
+        statistics(moved.iter().filter(off).map(|p| p[2])).0
+    };
+    assert!(mean(1.0) - mean(-1.0) > 0.75 * height);
+}
+
 /// Root mean square distance of what is nearer to a corner of two planes than 5 cm.
 fn at_corner(points: &[Point], distance: impl Fn(&Point) -> f64) -> f64 {
     let near = points.iter().filter(|p| p[0].hypot(p[2]) < 0.05);

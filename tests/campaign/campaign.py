@@ -32,6 +32,7 @@ SLACK = 30.0  # s beyond what the healthy command takes
 SEARCH = 120.0  # s, more than the search for the set-up of a 2D head takes, which doubts begin
 MAPPED = ("trajectory.txt", "map.laz")
 ORDINARY = frozenset({0, 1, 2, 3, 4, 130})
+_IS_THERE = "exists already"  # of a file or a recording that a command has written
 _SIGNS = (
     "Traceback (most",
     "panicked at",
@@ -108,7 +109,7 @@ def tried(seed: int, ground: Ground, kinds: tuple[str, ...] = tuple(KINDS)) -> O
         attempt = KINDS[kind](ground.healthy, folder, draw)
         if attempt.cleanup is not None:
             stack.callback(attempt.cleanup)
-        found = list(_problems(attempt, ground, kind))
+        found = list(_problems(attempt, ground, kind, folder))
         ended = found.pop(0)
         assert isinstance(ended, Ended)
         command = " ".join(_shown(part) for part in attempt.command)
@@ -122,7 +123,7 @@ def _shown(part: object) -> str:
     return os.fspath(part) if isinstance(part, Path) else str(part)[:100]
 
 
-def _problems(attempt: Attempt, ground: Ground, kind: str) -> Iterator[Ended | str]:
+def _problems(attempt: Attempt, ground: Ground, kind: str, folder: Path) -> Iterator[Ended | str]:
     """Yield how the command ended, then what is wrong with that."""
     longest = ground.seconds * 2 + SLACK + SEARCH
     others: list[Ended] = []
@@ -145,15 +146,28 @@ def _problems(attempt: Attempt, ground: Ground, kind: str) -> Iterator[Ended | s
         yield f"two writers ended with {ended.code} and {[one.code for one in others]}"
     if attempt.out is not None:
         yield from _of_result(attempt.out, ground, kind, ended)
-    is_done = ended.code == 0 and attempt.command[0] == "simulate"  # it replaces no recording
-    if attempt.again is not None and not is_done:
-        if attempt.before_again is not None:
-            attempt.before_again()
-        again = run(attempt.again, longest=longest)
-        if again.code != 0:
-            yield f"run again it ends with {again.code}: {again.said[-300:]}"
-        elif attempt.command[0] == "map" and attempt.out is not None:
-            yield from _other_bytes(attempt.out, ground, "run again")
+    if attempt.again is not None:
+        yield from _of_again(attempt, ground, folder, longest, ended)
+
+
+def _of_again(
+    attempt: Attempt, ground: Ground, folder: Path, longest: float, ended: Ended
+) -> Iterator[str]:
+    """What is wrong with what is there once the command was run again."""
+    if attempt.usual is not None and ended.code == 0:  # it was done before it was stopped
+        yield from attempt.usual.differences(folder)
+        return
+    if attempt.before_again is not None:
+        attempt.before_again()
+    again = run(attempt.again or [], longest=longest)
+    # What was done when it was stopped is not written over, and has to be whole.
+    is_whole = attempt.usual is not None and _IS_THERE in again.said
+    if again.code != 0 and not is_whole:
+        yield f"run again it ends with {again.code}: {again.said[-300:]}"
+    elif attempt.usual is not None:
+        yield from (f"run again: {what}" for what in attempt.usual.differences(folder))
+    elif attempt.command[0] == "map" and attempt.out is not None:
+        yield from _other_bytes(attempt.out, ground, "run again")
 
 
 def _of_end(ended: Ended, *, may_be_killed: bool) -> Iterator[str]:
@@ -182,8 +196,10 @@ def _of_result(out: Path, ground: Ground, kind: str, ended: Ended) -> Iterator[s
         finished_record(out)
     except BentwingError as error:
         yield f"complete, but {error}"
-    if kind in {"kill", "change", "disk", "writers"}:
+    if kind in {"change", "disk", "writers"}:
         yield from _other_bytes(out, ground, "complete")
+    if kind == "kill":
+        return
     healthy = _record(ground.healthy.run) or {}
     n, usual = (r.get("counts", {}).get("map.written", 0) for r in (record, healthy))
     if n < 0.9 * usual and not record.get("warnings"):

@@ -16,7 +16,9 @@ from subprocess import Popen
 from typing import TYPE_CHECKING, Any
 
 from campaign.messages import rewritten
-from campaign.options import hostile_option
+from campaign.options import hostile_option, whole
+from campaign.usual import RESUMED, WRITERS, Usual, usual
+from campaign.watched import run
 
 if TYPE_CHECKING:
     import random
@@ -44,6 +46,14 @@ class Healthy:
         """Names of the recordings that there are."""
         return [name for name in RECORDINGS if (self.folder / name).exists()]
 
+    def later(self) -> Path:
+        """Return a run of a later part of the bag, made when it is first asked for."""
+        later = self.run.with_name("later")
+        if not later.exists():
+            ended = run(_map(self.folder / RECORDINGS[0], self, later, "--start", "6"))
+            assert ended.code == 0, ended.said
+        return later
+
     @property
     def payload(self) -> Path:
         """The description of the head."""
@@ -62,6 +72,7 @@ class Attempt:
     limits : resource limits of the process: name and value
     again : a command that is run afterwards, undisturbed, and has to end well
     second : a command that is run at the same time
+    usual : what the command makes undisturbed, in the folder that the fault was given
     before_again, cleanup : are called before `again`, and at the end
     """
 
@@ -71,6 +82,7 @@ class Attempt:
     limits: tuple[tuple[str, int], ...] = ()
     again: list[Any] | None = None
     second: list[Any] | None = None
+    usual: Usual | None = None
     before_again: Callable[[], None] | None = None
     cleanup: Callable[[], None] | None = None
 
@@ -267,16 +279,10 @@ def _require(is_done: bool) -> None:
 def in_time(healthy: Healthy, folder: Path, draw: random.Random) -> Attempt:
     """The command is killed, or asked to end, at any moment."""
     number = draw.choice([signal.SIGKILL, signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
-    after = draw.uniform(0.3, 8.0)
-    out = folder / "out"
-    bag = healthy.folder / RECORDINGS[0]
-    command = draw.choice(
-        [
-            _map(bag, healthy, out),
-            ["evaluate", healthy.run, "-o", out, "-q"],
-            ["simulate", "office", "--duration", "22", "--head", "hokuyo-nod", "-o", out, "-q"],
-        ]
-    )
+    name = draw.choice(WRITERS)
+    undisturbed = usual(name, healthy)
+    after = draw.uniform(0.0, 1.1) * undisturbed.seconds
+    command = whole(name, healthy, folder)
 
     def end(process: Popen[bytes]) -> None:
         until = time.monotonic() + after
@@ -285,8 +291,8 @@ def in_time(healthy: Healthy, folder: Path, draw: random.Random) -> Attempt:
         if process.poll() is None:
             process.send_signal(number)
 
-    again = [*command, "--resume"] if command[0] == "map" else command
-    return Attempt(command, out, end, again=again)
+    again = [*command, "--resume"] if name in RESUMED else command
+    return Attempt(command, folder / "out", end, again=again, usual=undisturbed)
 
 
 def in_use(healthy: Healthy, folder: Path, draw: random.Random) -> Attempt:

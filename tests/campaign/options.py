@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import shutil
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pydantic import BaseModel
@@ -13,8 +15,7 @@ from bentwing.run.settings import RunSettings
 
 if TYPE_CHECKING:
     import random
-    from collections.abc import Iterator
-    from pathlib import Path
+    from collections.abc import Callable, Iterator
 
     from campaign.faults import Healthy
 
@@ -33,7 +34,7 @@ def hostile_option(healthy: Healthy, folder: Path, draw: random.Random) -> list[
         return _setting(healthy, folder, draw)
     named = [(name, option) for name in COMMANDS if name not in _LONG for option in _valued(name)]
     name, option = draw.choice(named)
-    return [*_base(name, healthy, folder), option, draw.choice(VALUES)]
+    return [*whole(name, healthy, folder), option, draw.choice(VALUES)]
 
 
 def _valued(command: str) -> list[str]:
@@ -42,22 +43,57 @@ def _valued(command: str) -> list[str]:
     return [p.opts[0] for p in params if not p.is_flag and p.name not in {"out", "help"}]
 
 
-def _base(name: str, healthy: Healthy, folder: Path) -> list[Any]:
-    bag, out = healthy.folder / "recording.bag", folder / "out"
+def whole(name: str, healthy: Healthy, folder: Path) -> list[Any]:
+    """A command that ends well and soon, and writes into a folder."""
+    bag, run, out = healthy.folder / "recording.bag", healthy.run, folder / "out"
     described = ["-p", healthy.payload]
-    whole = {
-        "map": [bag, *described, "-o", out, "--duration", "4"],
-        "localize": [bag, *described, "--map", healthy.run, "-o", out, "--duration", "4"],
-        "merge": [healthy.run, healthy.run, "-o", out],
-        "info": [bag, *described],
-        "payload": [],
-        "calibrate": [bag, *described, "-o", out],
-        "plan": [healthy.payload],
-        "evaluate": [healthy.run, "-o", out],
-        "view": [healthy.run, "--save", folder / "run.rrd"],
-        "simulate": ["office", "--duration", "22", "-o", out],
+    short = ["--set", "duration=4"]
+    arguments: dict[str, Callable[[], list[Any]]] = {
+        "map": lambda: [bag, *described, "-o", out, *short],
+        "localize": lambda: [bag, *described, "--map", run, "-o", out, "--set", "duration=12"],
+        "fleet": lambda: [
+            _one_recording(bag, folder),
+            *described,
+            "-o",
+            out,
+            "--workers",
+            "1",
+            *short,
+        ],
+        "merge": lambda: [run, healthy.later(), "-o", out],
+        "export": lambda: [run, "-o", folder / "out.ply"],
+        "info": lambda: [bag, *described],
+        "live": lambda: ["--ros2", *described, "--patience", "1", "--duration", "1"],
+        "payload": lambda: ["init", bag, "-o", folder / "out.yaml"],
+        "calibrate": lambda: [bag, *described, "-o", out],
+        "plan": lambda: [healthy.payload],
+        "evaluate": lambda: [run, "-o", out],
+        "report": lambda: [_copied(run, folder)],
+        "section": lambda: [run, "-o", folder / "out.svg"],
+        "terrain": lambda: [run, "-o", folder / "out.tif"],
+        "volume": lambda: [run, "--area", _area(folder)],
+        "mesh": lambda: [run, "--spacing", "0.2", "-o", folder / "out.ply"],
+        "view": lambda: [run, "--save", folder / "out.rrd"],
+        "simulate": lambda: ["office", "--duration", "22", "-o", out],
+        "reproduce": lambda: ["kaul2015", "--quick", "--part", "flight", "-o", out],
     }
-    return [name, *whole[name]]
+    return [name, *arguments[name]()]
+
+
+def _copied(run: Path, folder: Path) -> Path:
+    return Path(shutil.copytree(run, folder / "given"))
+
+
+def _one_recording(bag: Path, folder: Path) -> Path:
+    (folder / "flights.csv").write_text(f"recording\n{bag}\n", encoding="utf-8")
+    return folder / "flights.csv"
+
+
+def _area(folder: Path) -> Path:
+    ring = "[[-1, -1], [1, -1], [1, 1], [-1, -1]]"
+    area = f'{{"type": "Polygon", "coordinates": [{ring}]}}'
+    (folder / "area.geojson").write_text(area, encoding="utf-8")
+    return folder / "area.geojson"
 
 
 def _setting(healthy: Healthy, folder: Path, draw: random.Random) -> list[Any]:
@@ -73,7 +109,7 @@ def _setting(healthy: Healthy, folder: Path, draw: random.Random) -> list[Any]:
         if hasattr(mark, end)
     ]
     value = draw.choice([*map(str, ends), *map(str, ends), draw.choice(VALUES)])
-    command = _base("map", healthy, folder)
+    command = whole("map", healthy, folder)
     return [*command, "--estimator", estimator, "--set", f"{name}={value}"]
 
 

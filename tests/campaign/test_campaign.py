@@ -3,13 +3,8 @@
 
 import pytest
 
-from campaign.campaign import Ground, tried
+from campaign.campaign import tried
 from campaign.faults import KINDS
-
-
-@pytest.fixture(scope="module")
-def ground(simulated, tmp_path_factory):
-    return Ground.of(simulated("office", 22.0), tmp_path_factory.mktemp("ground") / "run")
 
 
 @pytest.mark.parametrize("number", range(len(KINDS)), ids=[*KINDS])

@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from dataclasses import dataclass
 from functools import partial
@@ -66,12 +67,17 @@ def run(
             start_new_session=True,
             preexec_fn=partial(_limit, limits) if limits else None,
         )
-        if meanwhile is not None:
-            meanwhile(process)
+        disturber = threading.Thread(target=meanwhile or _nothing, args=(process,))
+        disturber.start()
         code, peak = _wait(process, started + longest)
+        disturber.join()
         said.seek(0)
         text = said.read().decode("utf-8", "replace")
     return Ended(code, text, time.monotonic() - started, peak)
+
+
+def _nothing(process: subprocess.Popen[bytes]) -> None:
+    del process
 
 
 def _limit(limits: Sequence[tuple[str, int]]) -> None:

@@ -1,19 +1,16 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
 """Every reader of files: with any bytes changed, it reads the file or raises an error of ours.
 
-`HYPOTHESIS_EXAMPLES` sets how many changes are tried for each reader; inputs that once broke one stay as
-`@example`.
+Inputs that once broke one stay as `@example`.
 """
 
 from __future__ import annotations
 
-import os
 import struct
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, example, given, settings
-from hypothesis import strategies as st
+from hypothesis import example, given
 
 from bentwing.base.covariances import PoseCovariances
 from bentwing.base.errors import BentwingError
@@ -31,9 +28,9 @@ from bentwing.recording import Payload
 from bentwing.recording.containers.source import open_source
 from bentwing.run.choose import read_settings
 from bentwing.run.settings import RunSettings
+from support.changed_bytes import EDITS, SHARED, changed, outcome
 
 N = 40
-NUMBERS = (0, 1, 255, 2**15, 2**31 - 1, 2**32 - 1, 2**63 - 1, 2**64 - 1)
 
 
 def cloud(path):
@@ -169,64 +166,6 @@ READERS = {
     "a.mcap": (mcap, drain),
     "a.pcap": (pcap, drain),
 }
-EDITS = st.lists(
-    st.tuples(
-        st.sampled_from(["flip", "number", "lost", "repeated", "cut", "zeros", "text"]),
-        st.floats(0, 1, exclude_max=True),
-        st.integers(0, 2**16),
-    ),
-    min_size=1,
-    max_size=4,
-)
-TEXTS = (
-    b"nan",
-    b"1e999",
-    b"-1",
-    b"9" * 40,
-    b"\n",
-    b",",
-    b"\xff",
-    b"[" * 60,
-    b"*a",
-    b"\0",
-    b"{",
-    b"'",
-)
-
-
-def outcome(read, path):
-    """None where a file is read, else what its reader raises: any error of ours is one."""
-    try:
-        read(path)
-    except BentwingError:
-        return BentwingError
-    except Exception as error:
-        return error
-    return None
-
-
-def changed(content, edits):
-    """Bytes with changes at shares of their length."""
-    data = bytearray(content)
-    for kind, share, value in edits:
-        at = int(share * len(data))
-        if kind == "flip" and data:
-            data[at] ^= 1 << value % 8
-        elif kind == "number":
-            size = (2, 4, 8)[value % 3]
-            number = NUMBERS[value // 3 % len(NUMBERS)] & (2 ** (8 * size) - 1)
-            data[at : at + size] = number.to_bytes(size, "little")
-        elif kind == "lost":
-            del data[at : at + 1 + value % 9]
-        elif kind == "repeated":
-            data[at:at] = data[at : at + 1 + value % 99]
-        elif kind == "cut":
-            del data[at:]
-        elif kind == "zeros":
-            data[at : at + value % 200] = bytes(len(data[at : at + value % 200]))
-        else:
-            data[at:at] = TEXTS[value % len(TEXTS)]
-    return bytes(data)
 
 
 @pytest.fixture(scope="module")
@@ -246,11 +185,7 @@ def sound(tmp_path_factory):
 
 
 @pytest.mark.parametrize("name", READERS)
-@settings(
-    max_examples=int(os.environ.get("HYPOTHESIS_EXAMPLES", "60")),
-    deadline=None,
-    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
-)
+@SHARED
 @given(edits=EDITS)
 # sizes of layers and of chunks in LAZ, by which a decoder makes room or gives up
 @example(edits=[("number", 0.9, 5)])

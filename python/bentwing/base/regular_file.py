@@ -17,6 +17,36 @@ def resolved(path: Path) -> Path:
     return Path(os.path.realpath(path))
 
 
+def is_there(path: Path, kind: type[InputError] = InputError) -> bool:
+    """Whether there is something of this name.
+
+    Raises
+    ------
+    InputError
+        Of this kind, if no file can have the name, or its folder may not be looked into.
+    """
+    try:
+        path.stat()
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+    except OSError as error:
+        msg = f"{path}: cannot be opened ({error.strerror}); check its name and the rights to its folder"
+        raise kind(msg) from error
+    return True
+
+
+def require_there(path: Path) -> None:
+    """Refuse a name that nothing has.
+
+    Raises
+    ------
+    InputError
+    """
+    if not is_there(path):
+        msg = f"{path}: no such file or folder"
+        raise InputError(msg)
+
+
 def require_regular(
     path: Path, most: int | None = None, kind: type[InputError] = InputError
 ) -> None:
@@ -32,7 +62,7 @@ def require_regular(
     InputError
         Of this kind.
     """
-    if not path.exists():
+    if not is_there(path, kind):
         return
     if not path.is_file():
         msg = f"{path}: is not a file"

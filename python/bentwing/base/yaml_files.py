@@ -20,15 +20,19 @@ _DEEPEST = 50  # sections in sections
 
 
 class _Loader(yaml.SafeLoader):
-    """Says where a value stands that is not what its form or its tag says: `2024-13-45`, `!!int x`."""
+    """Says where a value stands that is none: `2024-13-45`, `!!int x`, a text with a NUL."""
 
     def construct_object(self, node: yaml.Node, deep: bool = False) -> object:  # noqa: FBT001, FBT002 - as yaml calls it
         try:
-            return super().construct_object(node, deep)
+            value = super().construct_object(node, deep)
         except (ArithmeticError, AttributeError, LookupError, ValueError) as error:
             kind = node.tag.rsplit(":", 1)[-1]
             problem = f"{str(node.value)[:40]!r} is no {kind} ({error})"
             raise ConstructorError(None, None, problem, node.start_mark) from error
+        if isinstance(value, str) and "\0" in value:
+            problem = f"{value[:40]!r} has a NUL, which no name can have"
+            raise ConstructorError(None, None, problem, node.start_mark)
+        return value
 
 
 def parse_yaml(text: str) -> object:

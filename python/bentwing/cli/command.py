@@ -22,10 +22,12 @@ _HELP = "Help"
 _COLUMN = 24  # width of names, the same in all groups
 _EXIT_CODES = """\
   0    done
-  2    the call is wrong
+  1    the disk is full, or memory or a right is missing
+  2    the call is wrong, or its output cannot be written
   3    an input cannot be used, or a recording is unfit for mapping
   4    the estimation failed, or the map is wrong; what was computed is kept
   5    some recordings are mapped, others are not
+  70   a bug in bentwing
   130  interrupted; what was computed is kept"""
 
 

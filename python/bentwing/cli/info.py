@@ -4,7 +4,6 @@
 import typer
 
 from bentwing.base.errors import RecordingError
-from bentwing.base.new_file import require_new
 from bentwing.cli import options
 
 UNFIT = RecordingError.exit_code
@@ -35,8 +34,6 @@ def command(
     from bentwing.calibrate.inspection import inspect
     from bentwing.cli.info_page import page
 
-    if write_payload is not None:
-        require_new(write_payload)
     inspection = inspect(recording, payload)
     if write_payload is not None:
         shown = inspection.set_up

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from bentwing.base.errors import BentwingError, UsageError
+from bentwing.base.errors import BentwingError, InputError, UsageError
 from bentwing.base.printable import printable
 from bentwing.cli.command import CONTEXT, closing
 from bentwing.cli.commands import LazyCommands
@@ -25,13 +25,17 @@ if TYPE_CHECKING:
     from types import FrameType
 
 INTERRUPTED = 130
-_UNEXPECTED = 70  # EX_SOFTWARE of sysexits.h
+UNEXPECTED = 70  # EX_SOFTWARE of sysexits.h
 # Matrices here are small: the threads of a BLAS would wait for each other most of the time, beside ours.
 _BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 _DEBUG = "BENTWING_DEBUG"
 
 _NO_ROOM = "; make room there, or name another folder"
-_REMEDIES = {errno.ENOSPC: _NO_ROOM, errno.EDQUOT: _NO_ROOM, errno.EFBIG: _NO_ROOM}
+_NO_NAME = "; no file can have this name, so give that of one that is there"
+_REMEDIES = {
+    errno.ENOSPC: _NO_ROOM, errno.EDQUOT: _NO_ROOM, errno.EFBIG: _NO_ROOM,
+    errno.ENAMETOOLONG: _NO_NAME, errno.ELOOP: _NO_NAME,
+}  # fmt: skip
 
 _EXAMPLES = (
     "bentwing simulate courtyard -o recording --duration 30",
@@ -116,9 +120,13 @@ def run_command(arguments: list[str]) -> int:
         return 0
     except OSError as error:
         where = f"{error.filename}: " if error.filename else ""
-        return _fail(f"{where}{error.strerror or error}{_REMEDIES.get(error.errno or 0, '')}", 1)
+        remedy = _REMEDIES.get(error.errno or 0, "")
+        code = InputError.exit_code if remedy is _NO_NAME else BentwingError.exit_code
+        return _fail(f"{where}{error.strerror or error}{remedy}", code)
     except MemoryError:
-        return _fail("not enough memory; give --duration, or a machine with more", 1)
+        return _fail(
+            "not enough memory; give --duration, or a machine with more", BentwingError.exit_code
+        )
     except Exception as error:
         return _unexpected(error)
     if result == INTERRUPTED:  # some versions of typer turn the interrupt into its exit code
@@ -153,6 +161,6 @@ def _unexpected(error: Exception) -> int:
     _fail(
         f"unexpected {type(error).__name__}: {error}; this is a bug in bentwing, please report it "
         f"with the output of the same command under {_DEBUG}=1",
-        _UNEXPECTED,
+        UNEXPECTED,
     )
-    return _UNEXPECTED
+    return UNEXPECTED

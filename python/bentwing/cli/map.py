@@ -5,7 +5,6 @@ from typing import Annotated
 
 import typer
 
-from bentwing.base.new_file import require_new
 from bentwing.cli import options
 from bentwing.cli.command import PRINT_SETTINGS
 
@@ -116,8 +115,6 @@ def command(
     if print_settings:
         typer.echo(chosen.to_yaml(), nl=False)
         return
-    if write_payload is not None:
-        require_new(write_payload)
     progress = create_progress(quiet=quiet)
     if any(map(is_folder_of_recordings, recording)):
         from bentwing.fleet.opened import side_by_side

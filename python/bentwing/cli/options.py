@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
 """The options that several commands have: each with one name, one short form and one sentence."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from enum import Enum
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
+from bentwing.base.new_file import require_folder, require_new, require_writable
 from bentwing.base.threads import MOST_THREADS
 from bentwing.closing.georeference.names import GeoreferenceMode
 from bentwing.map.formats import MapFormat
@@ -35,11 +36,30 @@ def enumeration(title: str, names: Iterable[str]) -> Any:  # noqa: ANN401 - a ty
     return Enum(title, {name: name for name in names}, type=str)
 
 
+def _checked(check: Callable[[Path], None]) -> Callable[[Path | None], Path | None]:
+    """Return what looks at a place to write to before anything else is done."""
+
+    def checked(path: Path | None) -> Path | None:
+        if path is not None:
+            check(path)
+        return path
+
+    return checked
+
+
+def folder(*names: str, **details: Any) -> Any:  # noqa: ANN401 - typer's own
+    """Return an option that names a folder to write into."""
+    return option(RESULT, *names, metavar="FOLDER", callback=_checked(require_folder), **details)
+
+
+def file(*names: str, **details: Any) -> Any:  # noqa: ANN401 - typer's own
+    """Return an option that names a file to write."""
+    return option(RESULT, *names, metavar="FILE", callback=_checked(require_writable), **details)
+
+
 def out(*aliases: str, **details: Any) -> Any:  # noqa: ANN401 - typer's own
     """Return the option that names the folder of the results."""
-    return option(
-        RESULT, "--out", "-o", *aliases, metavar="FOLDER", help="Write into this folder.", **details
-    )
+    return folder("--out", "-o", *aliases, help="Write into this folder.", **details)
 
 
 def payload(**details: Any) -> Any:  # noqa: ANN401 - typer's own
@@ -54,7 +74,7 @@ def payload(**details: Any) -> Any:  # noqa: ANN401 - typer's own
 
 def out_file(help_line: str) -> Any:  # noqa: ANN401 - typer's own
     """Return the option that names the file to write, which must not exist."""
-    return option(RESULT, "--out", "-o", metavar="FILE", help=help_line)
+    return file("--out", "-o", help=help_line)
 
 
 def names(text: str | None) -> tuple[str, ...] | None:
@@ -230,6 +250,7 @@ WritePayload = Annotated[
         RESULT,
         "--write-payload",
         metavar="FILE",
+        callback=_checked(require_new),
         help="Write the sensor head as it was found, as payload.yaml; the file must not exist.",
     ),
 ]

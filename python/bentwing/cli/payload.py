@@ -30,11 +30,9 @@ def command(
     *,
     out: Annotated[
         Path | None,
-        options.option(
-            options.RESULT,
+        options.file(
             "--out",
             "-o",
-            metavar="FILE",
             show_default="payload.yaml",
             help="Write this file; it must not exist.",
         ),

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from bentwing.cli import options
-from bentwing.cli.options import INPUT, RESULT, option
+from bentwing.cli.options import INPUT, option
 from bentwing.recording.ready import payload_path
 
 EXAMPLES = (
@@ -55,7 +55,7 @@ def command(  # noqa: PLR0917 - one parameter per option
     ] = 10.0,
     picture: Annotated[
         Path | None,
-        option(RESULT, metavar="FILE", help="Write a map of what the head sees as SVG."),
+        options.file(help="Write a map of what the head sees as SVG."),
     ] = None,
     *,
     as_json: options.Json = False,

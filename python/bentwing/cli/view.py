@@ -27,9 +27,7 @@ def command(
     ] = "rerun",
     save: Annotated[
         Path | None,
-        option(
-            RESULT,
-            metavar="FILE",
+        options.file(
             help="Write a file instead: .rrd for rerun, or .png as Open3D draws it, without a screen.",
         ),
     ] = None,
@@ -39,17 +37,13 @@ def command(
     ] = 3_000_000,
     pictures: Annotated[
         Path | None,
-        option(
-            RESULT,
-            metavar="FOLDER",
+        options.folder(
             help="Write plan and sections as PNG into this folder instead.",
         ),
     ] = None,
     video: Annotated[
         Path | None,
-        option(
-            RESULT,
-            metavar="FOLDER",
+        options.folder(
             help="Write the flight as frames of a video into this folder instead.",
         ),
     ] = None,

@@ -10,6 +10,7 @@ import numpy as np
 
 from bentwing.base.errors import UsageError
 from bentwing.base.progress import Progress, as_progress
+from bentwing.base.regular_file import require_there
 from bentwing.base.trajectory import Trajectory, read_tum
 from bentwing.closing.localize.coordinates import coordinates_of_run
 from bentwing.evaluate.against_surface import (
@@ -103,6 +104,8 @@ def evaluate(
         If a file cannot be used, or a reference does not fit.
     """
     question, progress = question or Question(), as_progress(progress)
+    for file in question.files():
+        require_there(file)  # which nobody wants to know only once the map is measured
     if question.reference_trajectory is not None:
         subject = subject.flown_with(question.reference_trajectory)
     if question.reference_map is not None and subject.map_path is None:

@@ -153,7 +153,10 @@ def _csv_rows(path: Path) -> Iterator[tuple[int, dict[str, str]]]:
 def _text_of(path: Path) -> str:
     try:
         require_regular(path, _MOST_BYTES)
-        return path.read_text(encoding="utf-8-sig")
+        text = path.read_text(encoding="utf-8-sig")
+        if "\0" not in text:
+            return text
+        msg = f"{path}: is no text, it holds NULs; save it as CSV in UTF-8"
     except FileNotFoundError:
         msg = f"{path}: no such file; give a manifest, or a folder of recordings"
     except OSError as error:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bentwing.base.errors import InputError, UsageError
-from bentwing.base.regular_file import require_regular
+from bentwing.base.regular_file import require_regular, require_there
 from bentwing.map.polygon import Polygon
 
 if TYPE_CHECKING:
@@ -62,9 +62,7 @@ def read_area(path: Path) -> AreaFile:
     InputError
         If it cannot be read or holds no area.
     """
-    if not path.exists():
-        msg = f"{path}: no such file or folder"
-        raise InputError(msg)
+    require_there(path)
     require_regular(path, _MOST_BYTES)
     suffix = path.suffix.lower()
     if suffix not in {*_GEOJSON, ".dxf"}:

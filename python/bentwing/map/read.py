@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bentwing.base.errors import BentwingError, InputError
-from bentwing.base.regular_file import require_regular
+from bentwing.base.regular_file import require_regular, require_there
 from bentwing.base.value import Value
 from bentwing.map.formats import FORMATS, MAP_SUFFIXES, load
 
@@ -65,9 +65,7 @@ def read_parts(
         If the file is of another kind, damaged or truncated, which may show at its end only.
     """
     path = Path(path)
-    if not path.exists():
-        msg = f"{path}: no such file or folder"
-        raise InputError(msg)
+    require_there(path)
     require_regular(path)
     suffix = path.suffix.lower()
     reader = next((f.reader for name, f in FORMATS.items() if suffix == f".{name}"), None)

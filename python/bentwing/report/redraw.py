@@ -10,6 +10,7 @@ import numpy as np
 
 from bentwing.base.atomic import write_text
 from bentwing.base.folder_lock import FolderLock
+from bentwing.base.new_file import require_folder
 from bentwing.base.plain import plain
 from bentwing.base.progress import as_progress
 from bentwing.base.provenance import describe_input
@@ -54,7 +55,8 @@ def redraw_report(
     Raises
     ------
     UsageError
-        If it is no complete run, another process writes there, or no browser can print.
+        If it is no complete run, it cannot be written to, another process writes there, or no browser
+        can print.
     InputError
         If a file in it cannot be read.
     """
@@ -63,6 +65,7 @@ def redraw_report(
     folder, record = finished.run.folder, finished.run.record
     if project is not None:
         record["project"] = plain(project.model_dump())
+    require_folder(folder)
     lock = FolderLock(folder)
     lock.acquire()
     try:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from bentwing.base.atomic import write_bytes, write_text
 from bentwing.base.errors import UsageError
+from bentwing.base.new_file import require_folder
 from bentwing.base.plain import plain
 from bentwing.base.progress import Progress
 from bentwing.base.provenance import bentwing_version
@@ -58,7 +59,7 @@ def reproduce(
     Raises
     ------
     UsageError
-        If there is no such paper or part.
+        If there is no such paper or part, or nothing can be written there.
     """
     if paper not in PARTS:
         msg = f"{paper}: there is nothing of it to reproduce; there is {', '.join(PARTS)}"
@@ -67,6 +68,7 @@ def reproduce(
     if unknown:
         msg = f"{paper} has no part {', '.join(unknown)}; it has {', '.join(PARTS[paper])}"
         raise UsageError(msg)
+    require_folder(out)
     out.mkdir(parents=True, exist_ok=True)
     written = Reproduced(out / "report.html", [], [])
     for name in parts or PARTS[paper]:

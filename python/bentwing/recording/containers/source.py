@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bentwing.base.errors import RecordingError
+from bentwing.base.regular_file import is_there
 from bentwing.recording.containers.bag_messages import bag_messages
 from bentwing.recording.containers.bag_recovery import MAGIC, scan_bag
 from bentwing.recording.containers.decompress import bound_rosbags
@@ -192,7 +193,7 @@ def open_source(paths: Sequence[Path]) -> Source:
 
 def _files(path: Path) -> list[Path]:
     """Return what to open for a path: itself, or the files of a folder without metadata."""
-    if not path.exists():
+    if not is_there(path, RecordingError):
         msg = f"{path}: no such file or folder; {EXPECTED}"
         raise RecordingError(msg)
     if not path.is_dir() and not path.is_file():

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import TYPE_CHECKING, Any
 
 from bentwing.recording.messages import wire, wire_packets
@@ -38,7 +39,7 @@ def peek_lidar(source: Source, topic: TopicInfo, lidar: Lidar, *, is_alone: bool
         None of them can be read, or what it takes to read them is missing.
     """
     packets = _first_packets(source, topic)
-    make = packet_sensors.lidar_packets(source, topic, lidar, packets[0].data)
+    make = packet_sensors.lidar_packets(source, topic, lidar, _usual(packets))
     pairs = _stamps(make(), packets, topic)
     clock = packet_clock.decide(pairs, make().period_ns, is_alone=is_alone)
     first_ns, offset_ns = _start(pairs, clock)
@@ -88,6 +89,12 @@ def _first_packets(source: Source, topic: TopicInfo) -> list[Packet]:
     if not found:
         raise unreadable(topic)
     return found
+
+
+def _usual(packets: list[Packet]) -> bytes:
+    """Return the first packet of the usual size: one that was cut off tells nothing of the others."""
+    ((size, _),) = Counter(len(one.data) for one in packets).most_common(1)
+    return next(one.data for one in packets if len(one.data) == size)
 
 
 def _fields(decoder: LidarPackets, packets: list[Packet]) -> dict[str, np.dtype[Any]]:

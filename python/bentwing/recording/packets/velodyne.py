@@ -72,7 +72,13 @@ def find_model(packet: bytes, told: PacketModel | None, topic: str) -> VelodyneM
             "its ROS driver make clouds (PointCloud2 with a time per point) of them"
         )
         raise RecordingError(msg)
-    number = packet[VELODYNE_SIZE - 1]
+    if len(packet) != VELODYNE_SIZE:
+        msg = (
+            f"{topic}: packets of {len(packet)} bytes, where those of a Velodyne have {VELODYNE_SIZE}; "
+            "record them whole"
+        )
+        raise RecordingError(msg)
+    number = packet[-1]
     fitting = [name for name, model in MODELS.items() if model.number == number]
     for name in fitting or MODELS:
         if name == told:

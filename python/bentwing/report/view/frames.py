@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bentwing.base.errors import InputError
+from bentwing.base.new_file import require_folder
 from bentwing.report.picture import paint, project, thinned, write_png
 from bentwing.report.view.pictures import Pictured, read_pictured
 
@@ -56,6 +57,7 @@ def write_frames(run: Path, out: Path, n: int, progress: Progress) -> list[Path]
     UsageError, InputError
         If there is no run, or its map and trajectory do not belong together.
     """
+    require_folder(out)
     with progress.stage("reading the map"):
         what = read_pictured(run, _MOST)
     if len(what.trajectory.times) < 2:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from bentwing.base.errors import InputError
+from bentwing.base.new_file import require_folder
 from bentwing.base.trajectory import Trajectory
 from bentwing.map.epsg import epsg_of_map
 from bentwing.report.colours import HEIGHT as HEIGHTS
@@ -94,6 +95,7 @@ def write_pictures(run: Path, out: Path, progress: Progress) -> list[Path]:
     All are orthographic, in ambient and eye-dome light, with title, grid, scale bar and legend; a pixel
     is a round length. Sections are cut through the middle of the way, `SLAB` thick.
     """
+    require_folder(out)
     with progress.stage("reading the map"):
         what = read_pictured(run)
     out.mkdir(parents=True, exist_ok=True)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bentwing.base.errors import UsageError
+from bentwing.base.new_file import require_writable
 from bentwing.base.progress import Progress
 from bentwing.report.colours import HEIGHT, colour
 from bentwing.report.stretches import degenerate
@@ -51,7 +52,7 @@ def view_run(
     Raises
     ------
     UsageError
-        If rerun is not installed, or the folder is no run.
+        If rerun is not installed, the folder is no run, or the file cannot be written.
     InputError
         If a file in it cannot be read.
     """
@@ -60,6 +61,8 @@ def view_run(
     except ImportError as error:
         msg = "the viewer is not installed: pip install 'bentwing[view]'"
         raise UsageError(msg) from error
+    if save is not None:
+        require_writable(save)
     with (progress or Progress()).stage("read the map", None, "points") as shown:
         contents = read_contents(folder, max_points, shown)
     stream = rerun.RecordingStream("bentwing")

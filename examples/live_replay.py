@@ -4,8 +4,9 @@
     python examples/live_replay.py recording.bag --payload payload.yaml
 
 One thread feeds by the stamps, another asks for the pose 200 times a second. The map grows in the
-rerun viewer (`pip install 'bentwing[view]'`), or in a file with `--save out.rrd`; `--no-viewer`
-only prints how old poses are, how long a call takes, and, with the truth, how wrong they are.
+rerun viewer (`pip install 'bentwing[view]'`), in a file with `--save out.rrd`, or with `--foxglove 8765`
+in Foxglove, which connects to that port (`pip install 'bentwing[foxglove]'`); `--no-viewer` only prints
+how old poses are, how long a call takes, and, with the truth, how wrong they are.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ import numpy as np
 import bentwing
 from bentwing import Trajectory, read_tum
 from bentwing.evaluate import absolute_error
+from bentwing.flight import FoxgloveServer
 from bentwing.odometry import ContinuousSettings
 from bentwing.recording import LidarBatch
 
@@ -146,7 +148,7 @@ def height_colors(heights: np.ndarray) -> np.ndarray:
 
 
 def watch(
-    odometry: bentwing.Odometry, replay: Replay, viewer: Viewer
+    odometry: bentwing.Odometry, replay: Replay, viewer: Viewer | FoxgloveServer
 ) -> tuple[list[StampedPose], np.ndarray]:
     """Ask for the pose until nothing more comes.
 
@@ -219,6 +221,7 @@ def main() -> None:
     parser.add_argument("--speed", type=float, default=1.0, help="times as fast as recorded")
     parser.add_argument("--shift", type=float, help="new data per window, s")
     parser.add_argument("--save", type=Path, metavar="OUT.rrd", help="instead of the viewer")
+    parser.add_argument("--foxglove", type=int, metavar="PORT", help="instead of the viewer")
     parser.add_argument("--no-viewer", action="store_true")
     parser.add_argument("--reference-trajectory", type=Path, metavar="TUM", help="the truth")
     asked = parser.parse_args()
@@ -226,11 +229,14 @@ def main() -> None:
     settings = (
         ContinuousSettings() if asked.shift is None else ContinuousSettings(shift=asked.shift)
     )
-    viewer = Viewer(asked.save, shown=not asked.no_viewer)
     with (
         bentwing.Recording(asked.recording, payload) as recording,
         bentwing.Odometry(payload, settings=settings) as odometry,
     ):
+        if asked.foxglove is None:
+            viewer = Viewer(asked.save, shown=not asked.no_viewer)
+        else:
+            viewer = FoxgloveServer(asked.foxglove, start_ns=recording.start_ns)
         replay = Replay(recording, odometry, asked.speed)
         replay.start()
         poses, calls = watch(odometry, replay, viewer)

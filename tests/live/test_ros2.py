@@ -67,6 +67,9 @@ def test_odometry_is_heard_by_another_participant_and_follows_the_truth(tmp_path
     assert found["tf"][0] == ["map", found["odometry"][0][2]]
     assert found["paths"]
     assert sorted(found["paths"]) == found["paths"]
+    assert sorted(found["maps"]) == found["maps"]
+    assert found["maps"][-1] > 5000
+    assert found["statuses"][-1] == "tracking"
     stamps = np.array([row[0] for row in found["odometry"]])
     assert len(stamps) > 100
     assert (np.diff(stamps) > 0).all()

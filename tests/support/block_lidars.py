@@ -23,9 +23,13 @@ RS_ELEVATIONS = {
     "rs16": [-15 + 2 * i for i in range(8)] + [15 - 2 * i for i in range(8)],
     "rs32": [-25 + 1.25 * i for i in range(32)],
     "helios": [15 - 2.19 * i for i in range(32)],
+    # up to 90° in truth, but there the wall is too far
+    "airy": [0.75 * i for i in range(96)],
 }
+# of an Airy that is mounted on its side
+AIRY_US = [0.0, 11.424, 22.848, 34.272, 45.696, 54.264, 62.832, 71.4, 79.016, 85.68, 92.344, 99.008]
 RS_AZIMUTHS = {"rs16": [0.0] * 16, "rs32": [3.6 * (-1) ** i for i in range(32)],
-               "helios": [1.2 * (i % 4) for i in range(32)]}  # fmt: skip
+               "helios": [1.2 * (i % 4) for i in range(32)], "airy": [2.4 * (i % 8) - 8 for i in range(96)]}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -48,6 +52,7 @@ class Lidar:
     lens: float
     stamp_before_us: Callable[[int], float]  # from the first block of n firings back to the stamp
     write: Callable[..., bytes]
+    height: float = 0.0  # of where the rays begin
 
     def firing(self, begin_us: float, scene) -> list[tuple[int, int]]:
         """(distance in units, intensity) of all channels of a block that begins then."""
@@ -184,11 +189,26 @@ def _rs_v2(stamp_us, blocks, *, is_dual):
     return head + _rs_body(blocks) + bytes(6)
 
 
+def _airy(stamp_us, blocks, *, is_dual):
+    """Of each firing two blocks with 48 channels; two flags stand above the bits of a distance."""
+    seconds, us = divmod(stamp_us, 1_000_000)
+    what = bytes([0, 3 if is_dual else 4, 0, 0])
+    head = b"\x55\xaa\x05\x5a" + bytes(12) + what
+    head += seconds.to_bytes(6, "big") + us.to_bytes(4, "big") + bytes([0, 1, 2]) + bytes(9)
+    halves = [
+        (azimuth, [(d | (at + i) % 4 << 14, s) for i, (d, s) in enumerate(channels[at : at + 48])])
+        for azimuth, channels in blocks
+        for at in (0, 48)
+    ]
+    return head + _rs_body(halves) + bytes(22)
+
+
 def device_packet(model: str, *, is_dual: bool = False) -> bytes:
     """RoboSense's packet about the device, with the angles of its beams."""
     packet = bytearray(1248)
     packet[:8] = b"\xa5\xff\x00\x5a\x11\x11\x55\x55"
     packet[300] = 0 if is_dual else 1
+    packet[289] = 1
     for i, (elevation, azimuth) in enumerate(
         zip(RS_ELEVATIONS[model], RS_AZIMUTHS[model], strict=True)
     ):
@@ -196,7 +216,8 @@ def device_packet(model: str, *, is_dual: bool = False) -> bytes:
             packet[1165 + 3 * i : 1168 + 3 * i] = round(abs(elevation) * 10_000).to_bytes(3, "big")
         else:
             digits = 1000 if model == "rs32" else 100
-            for at, angle in ((468, elevation), (564, azimuth)):
+            second = 756 if model == "airy" else 564
+            for at, angle in ((468, elevation), (second, azimuth)):
                 struct.pack_into(">BH", packet, at + 3 * i, angle < 0, round(abs(angle) * digits))
     return bytes(packet)
 
@@ -226,4 +247,6 @@ LIDARS = {
     "rs32": _rs("rs32", [*(2.88 * i for i in range(15)), 44.64, *(1.44 + 2.88 * i for i in range(15)), 46.08],
                 55.52, 0.005, 0.03997, _rs_v1),
     "helios": _rs("helios", [1.73 * i for i in range(32)], 55.56, 0.0025, 0.03498, _rs_v2),
+    "airy": Lidar([Channel(RS_ELEVATIONS["airy"][i], RS_AZIMUTHS["airy"][i], AIRY_US[i // 8]) for i in range(96)],
+                  111.08, 4, 0.005, math.hypot(0.0075, 0.00664), lambda _: 0.0, _airy, 0.04532),
 }  # fmt: skip

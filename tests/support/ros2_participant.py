@@ -150,6 +150,27 @@ class Path_(IdlStruct, typename="nav_msgs::msg::dds_::Path_"):
     poses: sequence[PoseStamped_]
 
 
+@dataclass
+class KeyValue_(IdlStruct, typename="diagnostic_msgs::msg::dds_::KeyValue_"):
+    key: str
+    value: str
+
+
+@dataclass
+class DiagnosticStatus_(IdlStruct, typename="diagnostic_msgs::msg::dds_::DiagnosticStatus_"):
+    level: uint8
+    name: str
+    message: str
+    hardware_id: str
+    values: sequence[KeyValue_]
+
+
+@dataclass
+class DiagnosticArray_(IdlStruct, typename="diagnostic_msgs::msg::dds_::DiagnosticArray_"):
+    header: Header_
+    status: sequence[DiagnosticStatus_]
+
+
 def copied(kind, message):
     """A message of rosbags as one of the types above."""
     values = []
@@ -176,11 +197,14 @@ def main(bag: str, domain: int, lidar: str, imu: str) -> None:
     }  # fmt: skip
     heard = {
         name: DataReader(participant, Topic(participant, f"rt{name}", kind), reliable)
-        for name, kind in (("/bentwing/odometry", Odometry_), ("/tf", TFMessage_), ("/bentwing/path", Path_))
+        for name, kind in (
+            ("/bentwing/odometry", Odometry_), ("/tf", TFMessage_), ("/bentwing/path", Path_),
+            ("/bentwing/map_points", PointCloud2_), ("/diagnostics", DiagnosticArray_),
+        )
     }  # fmt: skip
     print("ready", flush=True)
     sys.stdin.readline()
-    odometry, links, paths = [], [], []
+    odometry, links, paths, maps, statuses = [], [], [], [], []
 
     def taken(name):
         # A writer that leaves is told by samples without content.
@@ -198,6 +222,8 @@ def main(bag: str, domain: int, lidar: str, imu: str) -> None:
             [t.header.frame_id, t.child_frame_id] for one in taken("/tf") for t in one.transforms
         )
         paths.extend(len(one.poses) for one in taken("/bentwing/path"))
+        maps.extend(one.width for one in taken("/bentwing/map_points"))
+        statuses.extend(one.status[0].message for one in taken("/diagnostics"))
 
     with AnyReader([Path(bag)]) as reader:
         begin = None
@@ -212,7 +238,8 @@ def main(bag: str, domain: int, lidar: str, imu: str) -> None:
             hear()
     time.sleep(1.0)
     hear()
-    print(json.dumps({"odometry": odometry, "tf": links, "paths": paths}), flush=True)
+    found = {"odometry": odometry, "tf": links, "paths": paths, "maps": maps, "statuses": statuses}
+    print(json.dumps(found), flush=True)
 
 
 if __name__ == "__main__":

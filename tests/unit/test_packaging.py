@@ -6,10 +6,12 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 import yaml
 
 from bentwing.base.memory import memory_of_machine, peak_memory
+from bentwing.simulate.trajectories import _phases
 
 tomllib = pytest.importorskip("tomllib", reason="Python 3.10 has no tomllib")
 
@@ -55,7 +57,7 @@ def test_the_container_is_built_with_the_rust_that_is_promised():
     promised = toml("Cargo.toml")["workspace"]["package"]["rust-version"]
     text = (ROOT / "Containerfile").read_text(encoding="utf-8")
     assert f"FROM rust:{promised}-" in text
-    extras = re.search(r"\$wheel\[([\w,]+)\]", text).group(1).split(",")
+    extras = re.search(r"\$\{wheel\}\[([\w,]+)\]", text).group(1).split(",")
     assert set(extras) <= set(toml("pyproject.toml")["project"]["optional-dependencies"])
 
 
@@ -91,6 +93,23 @@ def test_what_is_published_was_built_for_every_system_installed_and_tried():
     names = {*tried["wheel"], *(one["wheel"] for one in tried["include"])}
     assert names <= built
     assert built - names == {"musllinux-x86_64", "musllinux-aarch64"}  # the first in install-musl
+
+
+def test_the_flights_with_which_packages_are_tried_are_long_enough():
+    """Rest, climb, descent and landing of the slowest flight through the courtyard take up to 20 s."""
+    files = [*WORKFLOWS, ROOT / "packaging" / "conda" / "recipe.yaml"]
+    found = [
+        float(duration)
+        for path in files
+        for duration in re.findall(
+            r"bentwing simulate .*--duration (\d+)", path.read_text(encoding="utf-8")
+        )
+    ]
+    assert len(found) == 4
+    rng = np.random.default_rng(101)
+    for duration in found:
+        for _ in range(100):
+            _phases(rng, duration, 3.0)  # refuses what is too short
 
 
 def test_the_memory_of_the_process_is_part_of_that_of_the_machine():

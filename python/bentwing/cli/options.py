@@ -90,7 +90,7 @@ def cleaning(*, keep_mixed: bool, keep_moving: bool) -> dict[str, bool]:
 
 _RECORDING = typer.Argument(
     metavar="RECORDING",
-    help="ROS 1 .bag, ROS 2 bag folder, .db3, .mcap or .pcap; several parts of one recording "
+    help="ROS 1 .bag, ROS 2 bag folder, .db3, .mcap, .pcap or .lvx2; several parts of one recording "
     "one after the other.",
     rich_help_panel=INPUT,
 )

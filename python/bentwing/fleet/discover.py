@@ -12,7 +12,12 @@ from bentwing.base.regular_file import resolved
 from bentwing.base.run_record import RECORD
 from bentwing.fleet.entry import Entry
 from bentwing.fleet.folder import SITE_RECORD
-from bentwing.recording.containers.source import EXPECTED, PCAP_SUFFIXES, is_folder_of_recordings
+from bentwing.recording.containers.source import (
+    EXPECTED,
+    LVX2_SUFFIX,
+    PCAP_SUFFIXES,
+    is_folder_of_recordings,
+)
 from bentwing.recording.flights import flights_of
 from bentwing.run.merging.source import distinct_names
 
@@ -20,7 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
 PAYLOAD = "payload.yaml"
-_SINGLE = (".bag", *PCAP_SUFFIXES)
+_SINGLE = (".bag", LVX2_SUFFIX, *PCAP_SUFFIXES)
 # A file of this name says nothing that its folder does not.
 _NAMELESS = "recording"
 

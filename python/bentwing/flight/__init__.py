@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from bentwing.flight.control.mavlink import MavlinkLink
     from bentwing.flight.control.spin_controller import SpinCommand, SpinController, SpinSettings
     from bentwing.flight.control.spin_target import SpinTarget
+    from bentwing.flight.foxglove_server import FoxgloveServer
     from bentwing.flight.live.live_map import MapUpdate
     from bentwing.flight.live.odometry import Odometry
     from bentwing.flight.live.prediction import StampedPose
@@ -38,6 +39,7 @@ else:
             "flight.control.mavlink": ["MavlinkLink"],
             "flight.control.spin_controller": ["SpinCommand", "SpinController", "SpinSettings"],
             "flight.control.spin_target": ["SpinTarget"],
+            "flight.foxglove_server": ["FoxgloveServer"],
             "flight.live.live_map": ["MapUpdate"],
             "flight.live.odometry": ["Odometry"],
             "flight.live.prediction": ["StampedPose"],
@@ -52,6 +54,7 @@ __all__ = [
     "BumperSettings",
     "CarrierState",
     "FlightLink",
+    "FoxgloveServer",
     "Intent",
     "MapUpdate",
     "MavlinkLink",

@@ -9,7 +9,7 @@ from typing import Literal
 LidarKind = Literal["hokuyo-utm30lx", "vlp16", "ouster", "livox", "hesai", "robosense", "generic"]
 # The models whose raw packets can be read; needed where the packets do not tell.
 VelodyneModel = Literal["hdl32e", "vlp16", "puck-hires", "vlp32a", "vlp32b", "vlp32c", "vls128"]
-RobosenseModel = Literal["rs16", "rs32", "helios"]
+RobosenseModel = Literal["rs16", "rs32", "helios", "airy"]
 PacketModel = Literal[VelodyneModel, RobosenseModel]
 
 

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from bentwing.base.clock import Clock
     from bentwing.recording.attributes import Attributes
     from bentwing.recording.batches import LidarBatch
+    from bentwing.recording.clock_steps import ClockSteps
     from bentwing.recording.point_times import Reading
     from bentwing.recording.readings import LidarReading
     from bentwing.recording.streams import RawMessage
@@ -36,6 +37,7 @@ class LidarStream:
     clock : of the recording
     cdr : ROS 2's encoding instead of ROS 1's
     use_recorder_time : the header stamps are all zero
+    steps : finds where the clock was set
     reading : of the points
     times : how the time of each point is read, where the type needs it
     needs_beam_times : refuse scans that do not tell when each beam was measured
@@ -51,6 +53,7 @@ class LidarStream:
         *,
         cdr: bool,
         use_recorder_time: bool,
+        steps: ClockSteps,
         times: Reading | None,
         needs_beam_times: bool,
         attributes: Attributes = NO_ATTRIBUTES,
@@ -61,6 +64,7 @@ class LidarStream:
             use_recorder_time=use_recorder_time,
             counts=self.counts,
             offset_ns=reading.offset_ns,
+            steps=steps,
         )
         self.n_points = 0
         self._topic, self._kind = topic, kind

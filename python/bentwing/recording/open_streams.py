@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from bentwing.recording.clock_steps import ClockStep, ClockSteps
 from bentwing.recording.lidar_stream import LidarStream
 from bentwing.recording.packets.clock import PacketClock
 from bentwing.recording.packets.streams import PacketImuStream, PacketLidarStream
@@ -47,6 +48,7 @@ def open_streams(
         for reading in (peeks[role].packet_clock for role in roles)
         if reading is not None
     }
+    of_device: list[ClockStep] = []
 
     def stream(role: str) -> Stream:
         found = peeks[role]
@@ -63,10 +65,15 @@ def open_streams(
                 return PacketImuStream(
                     found.topic, clock, samples, packet_clock, readings.imu, cdr=cdr
                 )
+        steps = ClockSteps(found.offset_ns, of_device)
         if role == "imu":
-            return ImuStream(name, clock, readings.imu, cdr=cdr, use_recorder_time=zero)
+            return ImuStream(
+                name, clock, readings.imu, cdr=cdr, use_recorder_time=zero, steps=steps
+            )
         if role == "encoder":
-            return EncoderStream(name, clock, readings.encoder, cdr=cdr, use_recorder_time=zero)
+            return EncoderStream(
+                name, clock, readings.encoder, cdr=cdr, use_recorder_time=zero, steps=steps
+            )
         return LidarStream(
             name,
             found.topic.type,
@@ -74,6 +81,7 @@ def open_streams(
             readings.lidar,
             cdr=cdr,
             use_recorder_time=zero,
+            steps=steps,
             times=found.reading,
             needs_beam_times=needs_beam_times,
             attributes=attributes,

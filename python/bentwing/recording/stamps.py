@@ -6,13 +6,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from bentwing.base.errors import RecordingError
+from bentwing.recording.clock_steps import MIN_STEP_NS, NS_PER_S
 from bentwing.recording.clocks.steady import SteadyClock
 
 if TYPE_CHECKING:
     from collections import Counter
 
-NS_PER_S = 1_000_000_000
-MAX_OFFSET_STEP_NS = 10 * NS_PER_S  # header against recorder; less is transport delay
+    from bentwing.recording.clock_steps import ClockSteps
+
 MAX_UNCONFIRMED_NS = NS_PER_S  # a larger step ahead of the recorder has to be confirmed
 MAX_JUMPS = 50  # consecutive messages; more is a clock that was set, not a damaged stamp
 AFTER_SEQUENCE = 4  # bytes, after which repeated messages are the same
@@ -39,15 +40,23 @@ class StampMonitor:
     use_recorder_time : the header stamps are all zero, so the recorder's clock has to do
     counts : receives `backwards_stamps`, `duplicate_stamps`, `stamp_jumps`
     offset_ns : added to every stamp, by the payload
+    steps : finds where the clock was set; without, such a recording is refused
     """
 
     def __init__(
-        self, topic: str, *, use_recorder_time: bool, counts: Counter[str], offset_ns: int = 0
+        self,
+        topic: str,
+        *,
+        use_recorder_time: bool,
+        counts: Counter[str],
+        offset_ns: int = 0,
+        steps: ClockSteps | None = None,
     ) -> None:
         self.gaps: list[Gap] = []
         self.first_backwards_ns: int | None = None
         self._topic, self._counts = topic, counts
         self._use_recorder_time, self._offset_ns = use_recorder_time, offset_ns
+        self.steps = None if use_recorder_time else steps
         self._last_ns: int | None = None
         self._last_offset_ns = 0
         self._n_jumps = 0
@@ -72,6 +81,10 @@ class StampMonitor:
             How many of the messages that wait for `accept` it comes before; None for a message to drop,
             which repeats the one before.
         """
+        if self.steps is not None:
+            self.steps.notice(header_ns + self._offset_ns, recorder_ns)
+            if self.steps.is_suspect:
+                return 0
         stamp_ns = self._raw_ns(header_ns, recorder_ns)
         # Two messages may well have one stamp, where stamps have a step and a late one held others up.
         before, self._newest = self._newest, (stamp_ns, raw[AFTER_SEQUENCE:])
@@ -91,7 +104,7 @@ class StampMonitor:
         if self._last_ns is None:
             self._take(stamp_ns, offset_ns)
             return stamp_ns
-        if abs(offset_ns - self._last_offset_ns) > MAX_OFFSET_STEP_NS:
+        if abs(offset_ns - self._last_offset_ns) > MIN_STEP_NS:
             self._reject_jump(offset_ns)
             return None
         if self._is_unconfirmed(stamp_ns, offset_ns):
@@ -108,7 +121,8 @@ class StampMonitor:
         return stamp_ns
 
     def _raw_ns(self, header_ns: int, recorder_ns: int) -> int:
-        return (recorder_ns if self._use_recorder_time else header_ns) + self._offset_ns
+        shift_ns = 0 if self.steps is None else self.steps.shift_ns(recorder_ns)
+        return (recorder_ns if self._use_recorder_time else header_ns) + self._offset_ns + shift_ns
 
     def _take(self, stamp_ns: int, offset_ns: int) -> None:
         self._last_ns, self._last_offset_ns, self._n_jumps = stamp_ns, offset_ns, 0
@@ -132,9 +146,8 @@ class StampMonitor:
         if self._n_jumps > MAX_JUMPS:
             step = (offset_ns - self._last_offset_ns) / NS_PER_S
             msg = (
-                f"{self._topic}: the header stamps step by {step:+.1f} s and stay there, the clock "
-                "was set during the recording; map the part before or after it with --start and "
-                "--duration"
+                f"{self._topic}: the header stamps step by {step:+.1f} s against the recorder's times and stay "
+                "there, the clock was set during the recording; cut it there and map the parts one by one"
             )
             raise RecordingError(msg)
 

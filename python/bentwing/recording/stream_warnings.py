@@ -3,12 +3,14 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 if TYPE_CHECKING:
     from bentwing.base.clock import Clock
+    from bentwing.recording.clock_steps import ClockSteps
     from bentwing.recording.streams import Stream
 
 MAX_LISTED = 3
@@ -41,6 +43,7 @@ def stream_warnings(topic: str, stream: Stream, clock: Clock) -> list[str]:
             f"were left out, the first at {_seconds(clock, monitor.first_backwards_ns):.1f} s; check "
             "that only one driver publishes and that its clock is not set while recording"
         )
+    sentences += _steps(topic, monitor.steps, clock)
     found = monitor.clock.findings
     if found.is_poor:
         sentences.append(
@@ -59,6 +62,22 @@ def stream_warnings(topic: str, stream: Stream, clock: Clock) -> list[str]:
             "network of the recording computer"
         )
     return sentences
+
+
+def _steps(topic: str, steps: ClockSteps | None, clock: Clock) -> list[str]:
+    """Return the sentence on a clock that was set."""
+    if steps is None or not steps.found:
+        return []
+    shifts = [0, *(step.shift_ns for step in steps.found)]
+    by = ", ".join(
+        f"by {(before - after) / 1e9:+.1f} s at {_seconds(clock, step.stamp_ns):.1f} s"
+        for (before, after), step in zip(itertools.pairwise(shifts), steps.found, strict=True)
+    )
+    return [
+        f"{topic}: the clock was set while recording, {by}; what follows is put where the recorder's times "
+        "say, to the milliseconds of their delays; where the carrier was moved meanwhile, map each session by "
+        "itself with --start and --duration"
+    ]
 
 
 def _seconds(clock: Clock, stamp_ns: int) -> float:

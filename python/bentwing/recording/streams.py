@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from bentwing.base.clock import Clock
     from bentwing.recording.batches import Batch
+    from bentwing.recording.clock_steps import ClockSteps
     from bentwing.recording.readings import EncoderReading, ImuReading
 
 RawMessage = tuple[int, bytes]  # recorder's time in ns, bytes
@@ -57,6 +58,7 @@ class ImuStream:
         *,
         cdr: bool,
         use_recorder_time: bool,
+        steps: ClockSteps,
     ) -> None:
         self.counts: Counter[str] = Counter()
         self.monitor = StampMonitor(
@@ -64,6 +66,7 @@ class ImuStream:
             use_recorder_time=use_recorder_time,
             counts=self.counts,
             offset_ns=reading.offset_ns,
+            steps=steps,
         )
         self._clock, self._reading, self._cdr = clock, reading, cdr
 
@@ -125,6 +128,7 @@ class EncoderStream:
         *,
         cdr: bool,
         use_recorder_time: bool,
+        steps: ClockSteps,
     ) -> None:
         self.counts: Counter[str] = Counter()
         self.monitor = StampMonitor(
@@ -132,6 +136,7 @@ class EncoderStream:
             use_recorder_time=use_recorder_time,
             counts=self.counts,
             offset_ns=reading.offset_ns,
+            steps=steps,
         )
         self._clock, self._reading, self._cdr = clock, reading, cdr
         self._last_angle: float | None = None

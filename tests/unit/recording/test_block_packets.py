@@ -21,7 +21,7 @@ from support.block_lidars import (
 
 START_US = 1_700_000_000 * 10**6
 DELAY_NS = 1_400_000
-ROBOSENSE = ("rs16", "rs32", "helios")
+ROBOSENSE = ("rs16", "rs32", "helios", "airy")
 NAMED = {"rs16", "rs32"}  # whose packets look alike
 HESAI = tuple(name for name in LIDARS if name not in ROBOSENSE)
 every_model = pytest.mark.parametrize("model", LIDARS)
@@ -97,7 +97,7 @@ def test_points_lie_on_the_wall_at_the_elevations_of_their_rings(turn, model):
     rotor = np.radians(360e6 * batch.times / TURN_US)
     lens = LIDARS[model].lens
     level = np.hypot(ahead - lens * np.cos(rotor), right - lens * np.sin(rotor))
-    found = np.degrees(np.arctan2(batch.points[:, 2], level))
+    found = np.degrees(np.arctan2(batch.points[:, 2] - LIDARS[model].height, level))
     np.testing.assert_allclose(found, elevations[batch.ring], atol=0.05)
 
 
@@ -125,14 +125,15 @@ def test_firings_without_return_are_counted(turn, model):
     assert recording.counts["lidar.zero"] == n_fired - len(batch.times)
 
 
-@pytest.mark.parametrize("model", [*HESAI, "rs32", "helios"])
+@pytest.mark.parametrize("model", [*HESAI, "rs32", "helios", "airy"])
 def test_of_two_returns_the_stronger_is_kept(turn, model):
     batch, _, _ = turn(model, weak=2.0)
     ahead, _ = ahead_of(model, batch.points)
     on_wall = batch.intensity == 40
     np.testing.assert_allclose(ahead[on_wall], WALL, atol=8e-3)
     weak = np.linalg.norm(batch.points[~on_wall], axis=1)  # where the wall is out of sight
-    np.testing.assert_allclose(weak, 2.0, atol=LIDARS[model].lens + 1e-3)
+    off = LIDARS[model].lens + LIDARS[model].height
+    np.testing.assert_allclose(weak, 2.0, atol=off + 1e-3)
 
 
 def test_of_two_returns_in_the_block_of_an_rs16_the_stronger_is_kept(tmp_path, packets):
@@ -159,7 +160,7 @@ def test_of_two_returns_in_the_block_of_an_rs16_the_stronger_is_kept(tmp_path, p
 def test_damaged_packets_are_counted_and_left_out(tmp_path, packets, model):
     found = packets_of(LIDARS[model], START_US, 60)
     wrong = bytearray(found[20][1])
-    first = {"rs16": 42, "rs32": 42, "helios": 42, "40p": 0}.get(model, 12)
+    first = {"rs16": 42, "rs32": 42, "helios": 42, "airy": 42, "40p": 0}.get(model, 12)
     azimuth = (
         slice(first + 2, first + 4) if model in {*ROBOSENSE, "40p"} else slice(first, first + 2)
     )
@@ -231,7 +232,8 @@ def test_a_robosense_without_its_angles_is_refused_with_what_to_record(tmp_path,
 @pytest.mark.parametrize(
     ("model", "told", "says"),
     [("rs32", None, "rs16 or rs32"), ("rs32", "helios", "but the payload says 'model: helios'"),
-     ("helios", "rs32", r"packets of a Helios, but.*\(helios\)")],
+     ("helios", "rs32", r"packets of a Helios, but.*\(helios\)"),
+     ("airy", "rs32", r"packets of an Airy, but.*\(airy\)")],
 )  # fmt: skip
 def test_a_model_that_is_not_told_or_told_wrongly_is_refused(tmp_path, packets, model, told, says):
     path = capture(packets, tmp_path / "a.pcap", model, packets_of(LIDARS[model], START_US, 40))
@@ -239,6 +241,32 @@ def test_a_model_that_is_not_told_or_told_wrongly_is_refused(tmp_path, packets, 
     payload = Payload.model_validate({"lidar": values, "imu": None})
     with pytest.raises(RecordingError, match=says):
         Recording(path, payload)
+
+
+def test_an_airy_of_48_channels_is_read_and_one_of_192_refused(tmp_path, packets):
+    lidar = LIDARS["airy"]
+    found = []
+    for number in range(60):
+        begin = number * 8 * lidar.block_us
+        rows = [(round(36000 * (begin + i * lidar.block_us) / TURN_US) % 36000) for i in range(8)]
+        # Halves of 48 channels are blocks of their own here: one firing each.
+        blocks = [(rows[i], [(800, 9)] * 48 + [(800, 9)] * 48) for i in range(0, 8, 2)]
+        packet = bytearray(lidar.write(START_US + round(begin), blocks, is_dual=False))
+        for i, azimuth in enumerate(rows):
+            packet[42 + 148 * i + 2 : 42 + 148 * i + 4] = azimuth.to_bytes(2, "big")
+        packet[32] = 1
+        found.append((begin, bytes(packet)))
+    batch, recording = read(
+        capture(packets, tmp_path / "a.pcap", "airy", found), payload_of("airy")
+    )
+    assert recording.counts["lidar.returns"] == 60 * 8 * 48
+    assert set(batch.ring) == set(range(48))
+    starts = np.unique(np.round(batch.times[batch.ring == 0] * 1e6, 1))
+    np.testing.assert_allclose(starts, np.arange(480) * lidar.block_us, atol=1.0)
+    wide = [(t, packet[:32] + b"\x03" + packet[33:]) for t, packet in found]
+    path = capture(packets, tmp_path / "b.pcap", "airy", wide)
+    with pytest.raises(RecordingError, match="an Airy with 192 channels"):
+        Recording(path, payload_of("airy"))
 
 
 def test_another_hesai_is_refused_with_those_that_can_be_read(tmp_path, packets):

@@ -60,6 +60,10 @@ MADE_ANEW = {
             rpy=[-3.1369486215758, 0.0019805316850838306, -1.5756556464922145],
         ),
     ),
+    "hilti-2023-robot": pose(
+        [0.13372435098296154, -0.011301799498041736, 0.010893033077978013],
+        rpy=[3.1330375472345637, -0.03502513872030596, -0.003399364361300018],
+    ),
     "m2dgr": np.linalg.inv(pose([-0.27255, 0.00053, -0.17954], quat=[0, 0, 0, 1])),
     "livox-mid360": np.linalg.inv(pose([11e-3, 23.29e-3, -44.12e-3], quat=[0, 0, 0, 1])),
     "botanic-garden": np.array(
@@ -124,6 +128,23 @@ def test_the_joints_of_the_hilti_scanner_confirm_the_lever_arm_and_its_direction
     found = as_payload(PREFIX + "hilti-2022").T_imu_lidar_matrix()
     np.testing.assert_allclose(found[:3, 3], between(imu, lidar)[:3, 3], atol=5e-4)
     assert found[2, 2] == pytest.approx(-1.0)  # the IMU's z points down
+
+
+def test_two_calibrations_of_the_hilti_robot_agree_in_their_direction():
+    T_lidar_imu = np.array(
+        [
+            [0.9993809082422996, -0.003397272928783347, 0.03501797791768812, -0.13406141062872667],
+            [-0.0036988105559615262, -0.9999566093030182, 0.008549755065630918, -0.010899820828818012],
+            [0.03498741261178718, -0.0086739868491098, -0.9993501102771111, 0.006109253103427932],
+            [0, 0, 0, 1],
+        ]
+    )  # fmt: skip
+    found = as_payload(PREFIX + "hilti-2023-robot").T_imu_lidar_matrix()
+    expected = np.linalg.inv(T_lidar_imu)
+    np.testing.assert_allclose(found[:3, :3], expected[:3, :3], atol=1e-3)
+    np.testing.assert_allclose(found[:3, 3], expected[:3, 3], atol=6e-3)
+    turned = between(found, T_lidar_imu)  # as if its direction were the other one
+    assert np.linalg.norm(turned[:3, 3]) > 0.2
 
 
 @of_each

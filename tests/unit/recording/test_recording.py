@@ -222,14 +222,6 @@ def test_a_single_wild_stamp_costs_one_message(tmp_path, ros1):
     assert recording.counts["lidar.stamp_jumps"] == 1
 
 
-def test_a_clock_set_while_recording_is_refused(tmp_path, ros1):
-    stamps = [i / 10 + (1000 if i > 10 else 0) for i in range(100)]
-    entries = [("/scan", i / 10, ros1.scan(stamp)) for i, stamp in enumerate(stamps)]
-    path = ros1.write(tmp_path / "a.bag", entries)
-    with pytest.raises(RecordingError, match="clock was set during the recording"):
-        read(path, NO_IMU)
-
-
 def test_overlapping_sweeps_lose_no_point(tmp_path, ros1):
     entries = [("/scan", t, ros1.scan(t, time_increment=0.0011)) for t in np.arange(0, 1, 0.1)]
     (lidar, _, _), _ = read(ros1.write(tmp_path / "a.bag", entries), NO_IMU)

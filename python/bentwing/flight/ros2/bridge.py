@@ -6,31 +6,20 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from bentwing.base import geometry
 from bentwing.base.errors import PayloadError, RecordingError
-from bentwing.base.mount import Pose
+from bentwing.flight.live.messages import LiveMessages
 from bentwing.flight.ros2.feeds import Feeds
 from bentwing.recording.messages.lidar_messages import LIDAR_MESSAGES
-from bentwing.recording.messages.ros_messages import MAP, RosMessages
 from bentwing.recording.topics import Roles, resolve
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from collections.abc import Sequence
 
+    from bentwing.flight.live.messages import Carrier
     from bentwing.flight.live.odometry import Odometry
-    from bentwing.flight.live.prediction import StampedPose
     from bentwing.flight.ros2.node import Ros2Node
     from bentwing.recording.payload import Payload
 
-ODOMETRY, PATH, TF = "/bentwing/odometry", "/bentwing/path", "/tf"
-WRITTEN = {
-    ODOMETRY: "nav_msgs/msg/Odometry",
-    PATH: "nav_msgs/msg/Path",
-    TF: "tf2_msgs/msg/TFMessage",
-}
-PATH_STEP, MOST_OF_PATH = 1.0, 1000  # s between poses at first, and poses
 IDLE = 0.002  # s to wait where nothing has come
 
 
@@ -73,6 +62,7 @@ class Bridge:
     node : reads and writes
     roles : the topics to read
     rate : Hz, at most, of odometry and /tf
+    viewers : get what is written, too
     """
 
     def __init__(
@@ -83,8 +73,9 @@ class Bridge:
         roles: Roles,
         *,
         rate: float = 50.0,
+        viewers: Sequence[Carrier] = (),
     ) -> None:
-        self._node, self._odometry, self._period = node, odometry, 1.0 / rate
+        self._node = node
         self.feeds = Feeds(odometry, payload, roles.lidar)
         take = {"lidar": self.feeds.lidar, "imu": self.feeds.imu, "encoder": self.feeds.encoder}
         self._take = {
@@ -92,15 +83,10 @@ class Bridge:
         }
         for topic in filter(None, roles):
             node.subscribe(topic.name, topic.type)
-        for name, kind in WRITTEN.items():
-            node.advertise(name, kind)
-        self._messages = RosMessages()
-        self._last: StampedPose | None = None
-        self._path: list[tuple[float, Pose]] = []
-        self._path_step = PATH_STEP
+        self._messages = LiveMessages(odometry, [node, *viewers], rate=rate)
 
     def step(self) -> None:
-        """Take what has come, and write the newest pose; wait a little where nothing has.
+        """Take what has come, and write what is new; wait a little where nothing has.
 
         Raises
         ------
@@ -115,41 +101,4 @@ class Bridge:
         # The IMU first: it tells of motion up to the newest points.
         for name in sorted(found, key=lambda one: self._take[one] == self.feeds.lidar):
             self._take[name](found[name])
-        if self._odometry.status not in ("waiting", "failed"):
-            self._write(self._odometry.pose())
-
-    def _write(self, pose: StampedPose) -> None:
-        last = self._last
-        if last is not None and pose.time - last.time < self._period:
-            return
-        self._last = pose
-        stamp_ns = (self.feeds.start_ns or 0) + round(pose.time * 1e9)
-        there = Pose(pose.position, pose.quat_xyzw)
-        covariances = self._odometry.estimate().covariances
-        matrix = np.zeros((6, 6)) if covariances is None else covariances.at([pose.time])[0]
-        child, messages = self.feeds.imu_frame, self._messages
-        odometry = messages.odometry(child, there, matrix, _velocity(last, pose), stamp_ns)
-        self._node.publish(ODOMETRY, messages.encoded(odometry))
-        self._node.publish(TF, messages.encoded(messages.tf(MAP, child, there, stamp_ns)))
-        if not self._path or pose.time - self._path[-1][0] >= self._path_step:
-            self._add_to_path(pose.time, there)
-
-    def _add_to_path(self, time: float, pose: Pose) -> None:
-        self._path.append((time, pose))
-        if len(self._path) > MOST_OF_PATH:
-            del self._path[1::2]
-            self._path_step *= 2
-        start_ns = self.feeds.start_ns or 0
-        stamps_ns = [start_ns + round(at * 1e9) for at, _ in self._path]
-        path = self._messages.path([one for _, one in self._path], stamps_ns)
-        self._node.publish(PATH, self._messages.encoded(path))
-
-
-def _velocity(last: StampedPose | None, pose: StampedPose) -> NDArray[np.float64]:
-    """Return velocity and turn rate (6,), m/s and rad/s, in the frame of the IMU."""
-    back = geometry.inverse(pose.quat_xyzw)
-    moved = geometry.rotate(back, pose.velocity)
-    if last is None or pose.time <= last.time:
-        return np.concatenate([moved, np.zeros(3)])
-    turn = geometry.log(geometry.multiply(geometry.inverse(last.quat_xyzw), pose.quat_xyzw))
-    return np.concatenate([moved, turn / (pose.time - last.time)])
+        self._messages.say(self.feeds.start_ns or 0, self.feeds.imu_frame)

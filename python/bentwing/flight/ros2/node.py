@@ -86,7 +86,7 @@ class Ros2Node:
         topic = Topic(self._participant, topic_name(name), dds_type(kind))
         self._writers[name] = kind, DataWriter(self._participant, topic, qos)
 
-    def publish(self, name: str, raw: bytes) -> None:
+    def publish(self, name: str, raw: bytes, stamp_ns: int) -> None:  # noqa: ARG002 - in its header
         """Write a message, encoded as CDR with its head."""
         kind, writer = self._writers[name]
         writer.write(raw_sample(kind, raw))

@@ -13,6 +13,7 @@ from bentwing.base.regular_file import is_there
 from bentwing.recording.containers.bag_messages import bag_messages
 from bentwing.recording.containers.bag_recovery import MAGIC, scan_bag
 from bentwing.recording.containers.decompress import bound_rosbags
+from bentwing.recording.containers.lvx2_scan import check_lvx2, scan_lvx2
 from bentwing.recording.containers.mcap_scan import scan_mcap
 from bentwing.recording.containers.pcap_scan import check_pcap, scan_pcap
 from bentwing.recording.containers.scanned import ScannedSource, TopicInfo
@@ -31,10 +32,11 @@ if TYPE_CHECKING:
     _Read = Callable[[Sequence[Connection], int | None], Iterator[tuple[Connection, int, bytes]]]
 
 PCAP_SUFFIXES = (".pcap", ".pcapng")
-SUFFIXES = (".bag", ".mcap", ".db3", *PCAP_SUFFIXES)
+LVX2_SUFFIX = ".lvx2"
+SUFFIXES = (".bag", ".mcap", ".db3", LVX2_SUFFIX, *PCAP_SUFFIXES)
 _METADATA = "metadata.yaml"
 _MOST_OF_METADATA = 2**24  # bytes
-EXPECTED = "give a ROS 1 .bag, a ROS 2 bag folder, a .db3, a .mcap or a .pcap file"
+EXPECTED = "give a ROS 1 .bag, a ROS 2 bag folder, a .db3, a .mcap, a .pcap or a .lvx2 file"
 
 
 class RosbagsSource:
@@ -226,6 +228,8 @@ def _open_one(path: Path) -> Source:
         raise RecordingError(msg)
     if not path.is_dir() and path.suffix in PCAP_SUFFIXES:
         return _open_pcap(path)
+    if not path.is_dir() and path.suffix == LVX2_SUFFIX:
+        return _open_lvx2(path)
     try:
         return RosbagsSource(path)
     except PermissionError as error:
@@ -241,6 +245,15 @@ def _open_pcap(path: Path) -> Source:
     source = ScannedSource(path, scan_pcap)
     if not source.topics:
         msg = f"{path}: a capture without a single frame; check that the lidar was sending"
+        raise RecordingError(msg)
+    return source
+
+
+def _open_lvx2(path: Path) -> Source:
+    check_lvx2(path)
+    source = ScannedSource(path, scan_lvx2)
+    if not source.topics:
+        msg = f"{path}: a file of Livox Viewer 2 without a single point; check that the lidar was sending"
         raise RecordingError(msg)
     return source
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from bentwing.recording.messages.laser_scan import LaserScans, MultiEchoScans
-from bentwing.recording.messages.livox import LivoxClouds
+from bentwing.recording.messages.livox import CUSTOM_MSG, LivoxClouds
 from bentwing.recording.messages.point_cloud2 import PointClouds
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ LIDAR_MESSAGES: dict[str, type[LidarDecoder[Any]]] = {
     "sensor_msgs/msg/MultiEchoLaserScan": MultiEchoScans,
     "sensor_msgs/msg/PointCloud2": PointClouds,
     "livox_ros_driver/msg/CustomMsg": LivoxClouds,
-    "livox_ros_driver2/msg/CustomMsg": LivoxClouds,
+    CUSTOM_MSG: LivoxClouds,
 }
 
 

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from bentwing.recording.point_times import GivenTimes
 
 MAX_OFFSET_NS = 1_000_000_000
+CUSTOM_MSG = "livox_ros_driver2/msg/CustomMsg"
 
 
 class RawLivox(NamedTuple):
@@ -87,6 +88,21 @@ def _sweep(
     return batch.where(np.argsort(batch.times, kind="stable"))
 
 
+def custom_message(stamp_ns: int, points: NDArray[np.void]) -> bytes:
+    """Return a livox_ros_driver2/CustomMsg in ROS 2's encoding, of points (N,) of the type POINT.
+
+    The offsets count from `stamp_ns`, which is less than 2³¹ s.
+    """
+    seconds, fraction_ns = divmod(stamp_ns, 1_000_000_000)
+    head = b"\0\1\0\0" + struct.pack("<2I", seconds, fraction_ns)
+    frame = (
+        struct.pack("<I", 12) + b"livox_frame\0"
+    )  # leaves the time base on a multiple of eight bytes
+    counts = struct.pack("<QI4xI", stamp_ns, len(points), len(points))
+    # CDR pads between points, not after the last one.
+    return head + frame + counts + points.tobytes()[:-1]
+
+
 @broken_if_malformed
 def livox_custom(raw: bytes, *, cdr: bool) -> RawLivox:
     """Read a livox_ros_driver(2)/CustomMsg."""
@@ -116,3 +132,6 @@ def _livox_dtype(order: str, step: int) -> np.dtype[np.void]:
             "itemsize": step,
         }
     )
+
+
+POINT = _livox_dtype("<", 20)

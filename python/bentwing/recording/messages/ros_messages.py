@@ -11,7 +11,7 @@ from rosbags.typesys import Stores, get_typestore
 from bentwing.base.clock import NS_PER_S
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -72,7 +72,12 @@ class RosMessages:
         ]
         return self._make("nav_msgs/msg/Path", self._header(stamps_ns[0], MAP), stamped)
 
-    def cloud(self, points: Array, intensity: NDArray[np.float32] | None, stamp_ns: int) -> Message:
+    def cloud(
+        self,
+        points: NDArray[np.floating[Any]],
+        intensity: NDArray[np.float32] | None,
+        stamp_ns: int,
+    ) -> Message:
         """Return points (N, 3), m, with intensities (N,) where they have some."""
         names = ["x", "y", "z", *([] if intensity is None else ["intensity"])]
         columns = [*points.T, *([] if intensity is None else [intensity])]
@@ -92,6 +97,15 @@ class RosMessages:
             data=np.frombuffer(rows.tobytes(), np.uint8),
             is_dense=True,
         )
+
+    def diagnostics(
+        self, name: str, level: int, says: str, values: Mapping[str, str], stamp_ns: int
+    ) -> Message:
+        """Return the status of a part: how bad it is (0 to 2), a word or sentence, and named values."""
+        kind = "diagnostic_msgs/msg/"
+        rows = [self._make(f"{kind}KeyValue", *pair) for pair in values.items()]
+        status = self._make(f"{kind}DiagnosticStatus", level, name, says, "", rows)
+        return self._make(f"{kind}DiagnosticArray", self._header(stamp_ns, ""), [status])
 
     def _make(self, name: str, *values: Any) -> Message:  # noqa: ANN401 - as the type has them
         return self.types.types[name](*values)

@@ -51,6 +51,9 @@ class BlockModel(Value):
     stamp_us : of a packet, the sensor's time of its first firing; None for no such packet
     n_returns : of a packet, how many blocks behind each other are of the same firing
     returns_in_block : how many returns of all C channels a block has, one behind the other
+    blocks_of_return : how many blocks behind each other have the C channels of a return
+    range_bits : of a distance; those above are flags
+    height : m, of where the rays begin
     """
 
     name: str
@@ -67,6 +70,9 @@ class BlockModel(Value):
     stamp_us: Callable[[np.void], float | None]
     n_returns: Callable[[np.void], int]
     returns_in_block: int = 1
+    blocks_of_return: int = 1
+    range_bits: int = 0xFFFF
+    height: float = 0.0
 
 
 class BlockPackets:
@@ -131,9 +137,12 @@ class BlockPackets:
         model = self._model
         n, n_blocks = blocks.shape
         n_all = n_returns * model.returns_in_block
-        per_firing = blocks["channels"].reshape(n, n_blocks // n_returns, n_all, -1)
-        ranges, intensities = _strongest(per_firing["distance"], per_firing["intensity"])
-        rotor = blocks["azimuth"][:, ::n_returns].astype(np.float64)
+        n_together = n_returns * model.blocks_of_return
+        per_firing = blocks["channels"].reshape(n, n_blocks // n_together, n_all, -1)
+        ranges, intensities = _strongest(
+            per_firing["distance"] & model.range_bits, per_firing["intensity"]
+        )
+        rotor = blocks["azimuth"][:, ::n_together].astype(np.float64)
         starts, steps = _firings(rotor, model.block_us)
         shifts = steps[:, None, None] * (model.firing_us / model.block_us)
         angles = np.radians((rotor[:, :, None] + shifts) / 100)
@@ -160,7 +169,7 @@ class BlockPackets:
         level = ranges * np.cos(elevations)
         ahead = level * np.cos(looks) + model.lens * np.cos(angles)
         right = level * np.sin(looks) + model.lens * np.sin(angles)
-        up = ranges * np.sin(elevations)
+        up = ranges * np.sin(elevations) + model.height
         axes = (ahead, -right, up) if model.ahead == "x" else (right, ahead, up)
         return np.stack(axes, axis=-1)
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
 Span = tuple[float, float]
 """First and last time, s."""
@@ -31,10 +31,16 @@ def spans_of(flagged: Iterable[tuple[float, bool]]) -> list[Span]:
     return spans
 
 
-def name_spans(spans: Sequence[Span]) -> str:
+def name_spans(
+    spans: Sequence[Span],
+    *,
+    one: Callable[[float, float], str] = lambda first, last: f"from {first:.1f} to {last:.1f} s",
+    others: Callable[[int], str] = lambda n: f"{n} shorter time{'s' if n > 1 else ''}",
+    conjunction: str = "and",
+) -> str:
     """Return `from 3.0 to 4.5 s and from 8.0 to 9.0 s`; of many spans the longest ones."""
     longest = sorted(sorted(spans, key=lambda s: s[0] - s[1])[:_MOST])
-    named = [f"from {first:.1f} to {last:.1f} s" for first, last in longest]
+    named = [one(first, last) for first, last in longest]
     if left := len(spans) - len(named):
-        named.append(f"{left} shorter time{'s' if left > 1 else ''}")
-    return " and ".join(filter(None, (", ".join(named[:-1]), named[-1])))
+        named.append(others(left))
+    return f" {conjunction} ".join(filter(None, (", ".join(named[:-1]), named[-1])))

@@ -81,6 +81,10 @@ def command(
             help="Boxes on the ground, elsewhere in every flight of the world: another day.",
         ),
     ] = 0,
+    spheres: Annotated[
+        int,
+        option(WORLD, metavar="N", help="Spheres of 0.1 m radius on posts, as control marks."),
+    ] = 0,
     things_seed: Annotated[
         int | None,
         option(
@@ -186,6 +190,7 @@ def command(
         "seed": seed,
         "flight_seed": flight_seed,
         "boxes": boxes,
+        "spheres": spheres,
         "things_seed": things_seed,
         "format": bag_format,
         "motor_rate": motor_rate,

@@ -43,17 +43,6 @@ class ExpectedAccuracy:
     heading_per_10m: float
     map_thickness: float | None
 
-    def sentence(self) -> str:
-        """Say it in a sentence."""
-        whole = _named(self.horizontal, self.vertical, self.heading)
-        short = _named(self.horizontal_per_10m, self.vertical_per_10m, self.heading_per_10m)
-        said = (
-            f"Expected accuracy (68 %): over the whole path {whole}; over ten metres of it {short}"
-        )
-        if self.map_thickness is None:
-            return f"{said}."
-        return f"{said}; surfaces as measured scatter by {1e3 * self.map_thickness:.0f} mm."
-
 
 def expected_accuracy(
     estimate: Estimate, range_sigma: float, revisits: Revisits | None = None
@@ -91,16 +80,3 @@ def _path(estimate: Estimate) -> float:
     times = estimate.covariances.times if estimate.covariances is not None else np.empty(0)
     positions, _ = trajectory.interpolate(times[trajectory.covers(times)])
     return float(np.linalg.norm(np.diff(positions, axis=0), axis=1).sum())
-
-
-def _named(horizontal: float, vertical: float, heading: float) -> str:
-    return (
-        f"{_length(horizontal)} horizontally, {_length(vertical)} vertically and "
-        f"{np.degrees(heading):.2g}° in heading"
-    )
-
-
-def _length(metres: float) -> str:
-    if metres < 0.1:
-        return f"{1e3 * metres:.2g} mm" if metres < 0.01 else f"{1e3 * metres:.0f} mm"
-    return f"{metres:.2f} m"

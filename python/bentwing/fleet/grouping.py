@@ -99,7 +99,7 @@ class _Rooms:
         free = _numbers({Path(self.made[request]).name for request in kept})
         found = []
         for group, (members, described, request) in zip(groups, asked, strict=True):
-            said = {"runs": described["runs"], "n_links": described["n_links"]}
+            said = {name: described[name] for name in ("runs", "n_links", "joins")}
             if len(members) == 1:
                 folder, verdict = None, members[0].verdict
             elif request in kept:

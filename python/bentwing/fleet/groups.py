@@ -35,6 +35,7 @@ class Group:
     state : of its verdict
     reason : why it is not good
     n_links : places that join the runs
+    joins : which two runs have how many of them in common, and whether a loop of runs confirms these
     is_earlier : whether the map was there already
     """
 
@@ -44,6 +45,7 @@ class Group:
     reason: str = ""
     n_links: int = 0
     is_earlier: bool = False
+    joins: Sequence[Mapping[str, Any]] = ()
 
 
 @dataclass(frozen=True, slots=True)

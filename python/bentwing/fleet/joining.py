@@ -150,4 +150,5 @@ def _group(place: Path, answer: Mapping[str, Any]) -> Group:
         reason_of(verdict),
         answer["n_links"],
         answer["is_earlier"],
+        answer.get("joins") or [],
     )

@@ -92,6 +92,7 @@ def _group(one: Group, out: Path) -> dict[str, Any]:
         "state": one.state,
         "reason": one.reason or None,
         "n_links": one.n_links,
+        "joins": list(one.joins),
         "is_earlier": one.is_earlier,
     }
 

@@ -10,15 +10,18 @@ import numpy as np
 
 from bentwing.report.plot import Series, line_plot
 from bentwing.report.sections import table
+from bentwing.report.texts import ENGLISH
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+
+    from bentwing.report.texts import Texts
 
 DEGREES, MILLIMETRES = 180 / np.pi, 1e3
 _SCALES = np.array([DEGREES, DEGREES, MILLIMETRES, MILLIMETRES])
 
 
-def beams_section(found: Mapping[str, Any] | None) -> str:
+def beams_section(found: Mapping[str, Any] | None, texts: Texts = ENGLISH) -> str:
     """Draw what was found of the beams; nothing where they are as recorded."""
     if not found:
         return ""
@@ -36,7 +39,7 @@ def beams_section(found: Mapping[str, Any] | None) -> str:
     lengths = [Series(n, at, sorted_offsets[:, i]) for i, n in ((2, "range"), (3, "height"))]
     figures = "".join(
         f"<figure>{line_plot(series, 'elevation as recorded, °', label)}"
-        f"<figcaption><b>{caption}</b></figcaption></figure>"
+        f"<figcaption><b>{texts.phrase(caption)}</b></figcaption></figure>"
         for series, label, caption in (
             (angles, "off by, °", "Angles of the beams"),
             (lengths, "off by, mm", "Ranges and heights of the beams"),
@@ -49,7 +52,7 @@ def beams_section(found: Mapping[str, Any] | None) -> str:
     head = ("beam", "elevation, °", "elevation +, °", "azimuth +, °", "range +, mm", "height +, mm")
     listed = table(head, rows, numbers=frozenset(range(6)))
     return (
-        f'<h2>Beams of the lidar</h2><p>{escape(said)}</p><div class="grid">{figures}'
+        f'<h2>{texts.phrase("Beams of the lidar")}</h2><p>{escape(said)}</p><div class="grid">{figures}'
         f'<div class="wide">{listed}</div></div>'
     )
 

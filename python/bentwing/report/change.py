@@ -88,7 +88,14 @@ def _plan(points: Array, kinds: NDArray[np.intp], centres: Array, drawn: Drawn) 
     key = [(_APPEARED, texts.kinds["appeared"]), (_DISAPPEARED, texts.kinds["disappeared"])]
     way = Way(places[:, 0], places[:, 1], None)
     return draw_plan(
-        view, drawn.frame, way=way, marks=marks, table=_GREY, key=key, name=texts.changes_plan
+        view,
+        drawn.frame,
+        way=way,
+        marks=marks,
+        table=_GREY,
+        key=key,
+        name=texts.changes_plan,
+        texts=texts,
     )
 
 

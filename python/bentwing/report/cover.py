@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from datetime import datetime
 from html import escape
 from typing import TYPE_CHECKING, Any
 
@@ -49,8 +50,10 @@ def cover(drawn: Drawn) -> str:
 
 def _made(record: Mapping[str, Any], texts: Texts) -> str:
     version = (record.get("versions") or {}).get("bentwing", "")
-    started = str(record.get("started") or "").replace("T", " ").replace("+00:00", " UTC")
-    return f"<p>{escape(f'{texts.made} {started} · bentwing {version}')}</p>"
+    when = record.get("started")
+    started = datetime.fromisoformat(str(when)) if when else None
+    said = "" if started is None else f"{started.strftime(texts.date)} {started:%H:%M:%S %Z}"
+    return f"<p>{escape(f'{texts.made} {said} · bentwing {version}')}</p>"
 
 
 def _plan(record: Mapping[str, Any], views: MapViews, texts: Texts) -> str:
@@ -60,7 +63,7 @@ def _plan(record: Mapping[str, Any], views: MapViews, texts: Texts) -> str:
         _grid(record, views, texts),
         texts.plan_roof if views.ceiling is not None else "",
         texts.plan_marks if marks else "",
-        spans_sentence(degenerate_spans(record.get("windows") or [])),
+        spans_sentence(degenerate_spans(record.get("windows") or []), texts),
     ]
     note = " ".join(sentence for sentence in said if sentence)
     return sections.figure(views.plan, texts.plan, note)
@@ -83,7 +86,7 @@ def _left_out(record: Mapping[str, Any], texts: Texts) -> str:
     if not said:
         return texts.left_none
     total, written = counts.get("lidar.returns"), counts.get("map.written")
-    lead = texts.of_returns.format(n=total, written=written) if total and written else ""
+    lead = texts.say(texts.of_returns, n=total, written=written) if total and written else ""
     return f"{lead} {'; '.join(said)}.".strip()
 
 

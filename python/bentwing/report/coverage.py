@@ -12,9 +12,12 @@ from bentwing.base.voxels import by_key
 from bentwing.report.colours import HEIGHT, TIME, colour
 from bentwing.report.picture import PAPER, View, thinned
 from bentwing.report.svg import map_view
+from bentwing.report.texts import ENGLISH
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    from bentwing.report.texts import Texts
 
 _CELLS = 160  # along the longer side of the map
 _FINEST = 0.1  # m, edge of a cell
@@ -50,7 +53,7 @@ class Coverage:
 
 
 def draw_coverage(
-    points: NDArray[np.float64], times: NDArray[np.float64], n_points: int
+    points: NDArray[np.float64], times: NDArray[np.float64], n_points: int, texts: Texts = ENGLISH
 ) -> Coverage | None:
     """Count points and visits in squares of the plan; None where there is nothing to count.
 
@@ -58,6 +61,7 @@ def draw_coverage(
     ----------
     points, times : (N, 3) m and (N,) s, an even sample of the map
     n_points : of the whole map
+    texts : words of the language
     """
     low, high = np.percentile(thinned(points[:, :2]), [0.2, 99.8], axis=0)
     cell = max(_FINEST, float((high - low).max()) / _CELLS)
@@ -78,16 +82,16 @@ def draw_coverage(
     return Coverage(
         map_view(
             _picture(shown, seen, span, HEIGHT, frame),
-            "points per m²",
+            texts.density_legend,
             HEIGHT,
-            name="Point density from above",
-            ends=(f"{10 ** span[0]:,.0f}", f"{10 ** span[1]:,.0f}"),
+            name=texts.density,
+            ends=(texts.number(10 ** span[0], ",.0f"), texts.number(10 ** span[1], ",.0f")),
         ),
         map_view(
             _picture(visits, seen, (1.0, most), TIME, frame),
-            "visits",
+            texts.visits_legend,
             TIME,
-            name="Visits from above",
+            name=texts.visits,
             ends=("1", f"{most:.0f}"),
         ),
         cell,

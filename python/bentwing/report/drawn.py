@@ -64,6 +64,6 @@ class Drawn:
         n_points = int((record.get("counts") or {}).get("map.points") or len(points))
         marks = marks_of(georeference, frame)
         windows = record.get("windows") or []
-        views = draw_views(points, times, way, windows, frame=frame, marks=marks)
-        coverage = draw_coverage(points, times, n_points)
+        views = draw_views(points, times, way, windows, frame=frame, marks=marks, texts=texts)
+        coverage = draw_coverage(points, times, n_points, texts)
         return cls(record, way, points, times, views, coverage, frame, texts)

@@ -32,12 +32,12 @@ def engineering_section(
 ) -> str:
     """Fold everything technical away; on paper one sentence stands for it."""
     parts = [
-        _motion(trajectory, spin),
-        _windows(record),
-        _closing(record),
-        f"<h2>Calibration of the sensor head</h2>{_calibrations(record)}",
-        beams_section(record.get("beams")),
-        _record(record),
+        _motion(trajectory, spin, texts),
+        _windows(record, texts),
+        _closing(record, texts),
+        f"<h2>{texts.phrase('Calibration of the sensor head')}</h2>{_calibrations(record)}",
+        beams_section(record.get("beams"), texts),
+        _record(record, texts),
     ]
     return (
         f'<details class="engineering"><summary><b>{escape(texts.engineering)}</b> '
@@ -46,23 +46,26 @@ def engineering_section(
     )
 
 
-def _motion(trajectory: Trajectory, spin: Spin | None) -> str:
+def _motion(trajectory: Trajectory, spin: Spin | None, texts: Texts) -> str:
     t, p = trajectory.times, trajectory.positions
     position = line_plot([Series(n, t, p[:, i]) for i, n in enumerate("xyz")], "time, s", "position, m")  # fmt: skip
     steps = slice(None, None, 10)  # speeds over a tenth of a second, without the vibration
     speed = np.linalg.norm(np.diff(p[steps], axis=0), axis=1) / np.maximum(np.diff(t[steps]), 1e-9)
     figures = [
-        figure(position, "Position", "of the IMU in the map"),
-        figure(line_plot([Series("speed", t[steps][1:], speed)], "time, s", "speed, m/s"), "Speed"),
+        figure(position, texts.phrase("Position"), texts.phrase("of the IMU in the map")),
+        figure(
+            line_plot([Series("speed", t[steps][1:], speed)], "time, s", "speed, m/s"),
+            texts.phrase("Speed"),
+        ),
     ]
     if spin is not None:
         rate = line_plot([Series("rate", spin[0], np.degrees(spin[1]))], "time, s", "rate of turn, °/s", width=1140)  # fmt: skip
         note = "of the sensor head; where it stalls, the scanner sees one plane only"
-        figures.append(figure(rate, "Rate of turn", note, wide=True))
-    return f'<h2>Motion</h2><div class="grid">{"".join(figures)}</div>'
+        figures.append(figure(rate, texts.phrase("Rate of turn"), texts.phrase(note), wide=True))
+    return f'<h2>{texts.phrase("Motion")}</h2><div class="grid">{"".join(figures)}</div>'
 
 
-def _windows(record: Mapping[str, Any]) -> str:
+def _windows(record: Mapping[str, Any], texts: Texts) -> str:
     windows: Sequence[Mapping[str, Any]] = record.get("windows") or []
     if not windows:
         return ""
@@ -74,23 +77,25 @@ def _windows(record: Mapping[str, Any]) -> str:
     residual = [Series("residual", t, _column(windows, "residual_rms"))]
     surfels = [Series("surfels", t, _column(windows, "n_surfels"))]
     figures = [
-        figure(line_plot(matches, "time, s", "matches", bands=spans), "Matches", "of surfaces, per window; red where a direction of motion was not seen"),
-        figure(line_plot(share, "time, s", "inliers, %", top=100, bands=spans), "Inliers", "matches that agree"),
-        figure(line_plot(residual, "time, s", "residual over expected noise", bands=spans), "Residual", "root mean square distance of matches over the expected noise of one point; a quarter is usual, as a piece of surface is the mean of many points"),
-        figure(line_plot(surfels, "time, s", "surfels", bands=spans), "Surfels", "pieces of surface seen per window"),
+        figure(line_plot(matches, "time, s", "matches", bands=spans), texts.phrase("Matches"), "of surfaces, per window; red where a direction of motion was not seen"),
+        figure(line_plot(share, "time, s", "inliers, %", top=100, bands=spans), texts.phrase("Inliers"), "matches that agree"),
+        figure(line_plot(residual, "time, s", "residual over expected noise", bands=spans), texts.phrase("Residual"), "root mean square distance of matches over the expected noise of one point; a quarter is usual, as a piece of surface is the mean of many points"),
+        figure(line_plot(surfels, "time, s", "surfels", bands=spans), texts.phrase("Surfels"), "pieces of surface seen per window"),
     ]  # fmt: skip
     notes = "".join(
         f"<p>{escape(sections.capital(str(n)))}.</p>" for n in record.get("notes") or []
     )
     return (
-        f"<h2>Estimate, window by window</h2><p>{escape(sections.quality(windows))}</p>{notes}"
+        f"<h2>{texts.phrase('Estimate, window by window')}</h2><p>{escape(sections.quality(windows))}</p>{notes}"
         f'<div class="grid">{"".join(figures)}</div>'
     )
 
 
-def _closing(record: Mapping[str, Any]) -> str:
+def _closing(record: Mapping[str, Any], texts: Texts) -> str:
     asked = bool((record.get("settings") or {}).get("loop_closure"))
-    return f"<h2>Loops</h2>{closing_table(record.get('loop_closure'), asked=asked)}"
+    return (
+        f"<h2>{texts.phrase('Loops')}</h2>{closing_table(record.get('loop_closure'), asked=asked)}"
+    )
 
 
 def _calibrations(record: Mapping[str, Any]) -> str:
@@ -101,7 +106,7 @@ def _calibrations(record: Mapping[str, Any]) -> str:
     return "".join(tables)
 
 
-def _record(record: Mapping[str, Any]) -> str:
+def _record(record: Mapping[str, Any], texts: Texts) -> str:
     settings, versions = record.get("settings") or {}, record.get("versions") or {}
     timings = record.get("timings") or {}
     blocks = [
@@ -110,11 +115,12 @@ def _record(record: Mapping[str, Any]) -> str:
         ("Time and memory", sections.timings_table(timings, record.get("peak_memory_mb"))),
         ("Versions", _named(("of", "version"), versions)),
     ]
-    cells = "".join(f"<div><h3>{name}</h3>{html}</div>" for name, html in blocks)
+    cells = "".join(f"<div><h3>{texts.phrase(name)}</h3>{html}</div>" for name, html in blocks)
     inputs = sections.inputs_table(record.get("inputs") or [])
     return (
-        f'<h2>Record</h2><div class="grid">{cells}</div>'
-        f"<h3>Settings</h3>{_named(('setting', 'value'), settings)}<h3>Inputs</h3>{inputs}"
+        f'<h2>{texts.phrase("Record")}</h2><div class="grid">{cells}</div>'
+        f"<h3>{texts.phrase('Settings')}</h3>{_named(('setting', 'value'), settings)}"
+        f"<h3>{texts.phrase('Inputs')}</h3>{inputs}"
     )
 
 

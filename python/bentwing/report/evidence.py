@@ -13,6 +13,7 @@ from bentwing.report.sections import figure, refinement_sentence
 from bentwing.report.views import SLAB
 
 if TYPE_CHECKING:
+    import numpy as np
     from numpy.typing import NDArray
 
     from bentwing.evaluate.revisits import Revisits
@@ -20,8 +21,8 @@ if TYPE_CHECKING:
     from bentwing.report.texts import Texts
 
 
-def map_section(drawn: Drawn) -> str:
-    """Show the map from all sides, and to turn."""
+def map_section(drawn: Drawn, values: NDArray[np.float32] | None = None) -> str:
+    """Show the map from all sides, and to turn; coloured by `map.sample.VALUES` (N, 3) as well."""
     record, views, texts = drawn.record, drawn.views, drawn.texts
     if views is None:
         is_wanted = (record.get("settings") or {}).get("writes_map", True)
@@ -35,11 +36,13 @@ def map_section(drawn: Drawn) -> str:
             record.get("windows") or [],
             ceiling=views.ceiling,
             frame=drawn.frame,
+            values=values,
+            texts=texts,
         ),
         figure(views.oblique, texts.oblique, texts.oblique_note, wide=True),
         figure(views.plan_time, texts.by_time, texts.by_time_note, wide=True),
         figure(views.side, texts.side, texts.side_note, wide=True),
-        figure(views.section, texts.section, texts.section_note.format(slab=SLAB), wide=True),
+        figure(views.section, texts.section, texts.say(texts.section_note, slab=SLAB), wide=True),
     ]
     said = refinement_sentence((record.get("map") or {}).get("refinement"), texts)
     return f'<h2>{escape(texts.map)}</h2>{said}<div class="grid">{"".join(figures)}</div>'
@@ -50,8 +53,8 @@ def coverage_section(drawn: Drawn) -> str:
     found, texts = drawn.coverage, drawn.texts
     if found is None:
         return ""
-    density = texts.density_note.format(cell=found.cell, median=found.median_density)
-    visits = texts.visits_note.format(area=found.area, again=100 * found.share_again)
+    density = texts.say(texts.density_note, cell=found.cell, median=found.median_density)
+    visits = texts.say(texts.visits_note, area=found.area, again=100 * found.share_again)
     figures = figure(found.density, texts.density, density) + figure(
         found.visits, texts.visits, visits
     )
@@ -68,8 +71,8 @@ def agreement_section(
         walls = wall_thickness(points, times)
     except ValueError:
         walls = None
-    loops = revisits_table(revisits, None if walls is None else walls.median)
+    loops = revisits_table(revisits, None if walls is None else walls.median, texts)
     return (
-        f"<section><h2>{escape(texts.agreement)}</h2>{consistency_table(walls, revisits)}"
+        f"<section><h2>{escape(texts.agreement)}</h2>{consistency_table(walls, revisits, texts)}"
         f"<h3>{escape(texts.visited_again)}</h3>{loops}</section>"
     )

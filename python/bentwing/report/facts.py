@@ -33,7 +33,7 @@ def job(record: Mapping[str, Any], trajectory: Trajectory, texts: Texts) -> list
     project = project_in(record) or Project()
     rows = [
         (texts.project, project.name),
-        (texts.number, project.number),
+        (texts.number_of, project.number),
         (texts.site, project.site),
         (texts.client, project.client),
         (texts.contractor, project.contractor),
@@ -83,7 +83,8 @@ def _spans(
         epoch = datetime.fromtimestamp(start // 10**9, timezone.utc)
         ends = [float(spans[0][0]), float(spans[-1][1])] if spans else [0.0, 0.0]
         first, last = ((epoch + timedelta(seconds=s)).astimezone(project.zone) for s in ends)
-        found.append(f"{first:%Y-%m-%d, %H:%M:%S} {DASH} {last:%H:%M:%S} {first:%Z}")
+        day = first.strftime(texts.date)
+        found.append(f"{day}, {first:%H:%M:%S} {DASH} {last:%H:%M:%S} {first:%Z}")
     return found
 
 
@@ -91,11 +92,21 @@ def coordinates(record: Mapping[str, Any], texts: Texts) -> str:
     """Name the coordinate system of the map."""
     found = record.get("georeference") or {}
     if "epsg" in found:
-        heights = found.get("heights") or "those of the system"
-        return texts.system.format(name=found.get("crs", ""), epsg=found["epsg"], heights=heights)
+        heights = _heights(found.get("heights") or "those of the system", texts)
+        return texts.say(
+            texts.system, name=found.get("crs", ""), epsg=found["epsg"], heights=heights
+        )
     if found.get("mode"):
         return texts.site_frame
     return texts.given_system if found else texts.local_frame
+
+
+def _heights(said: str, texts: Texts) -> str:
+    """Say what heights are above: the name of a system or an ellipsoid stays."""
+    for english in ("above the ellipsoid", "those of the system", "those of"):
+        if said.startswith(english):
+            return said.replace(english, texts.phrase(english), 1)
+    return said
 
 
 def left_out(record: Mapping[str, Any], texts: Texts) -> list[str]:
@@ -106,19 +117,21 @@ def left_out(record: Mapping[str, Any], texts: Texts) -> list[str]:
     for name, keys in _OF_RETURNS.items():
         n = sum(counts.get(key, 0) for key in keys)
         if n:
-            share = f" ({_percent(n / total)})" if total else ""
-            said.append(f"{n:,}{share} {texts.reasons[name]}")
+            share = f" ({_percent(n / total, texts)})" if total else ""
+            said.append(f"{texts.number(n, ',')}{share} {texts.reasons[name]}")
     fixes = (record.get("georeference") or {}).get("fixes") or {}
     if fixes.get("rejected"):
-        said.append(texts.left_fixes.format(n=fixes["rejected"], of=fixes.get("fixes", 0)))
+        said.append(texts.say(texts.left_fixes, n=fixes["rejected"], of=fixes.get("fixes", 0)))
     marks = (record.get("georeference") or {}).get("control_points") or []
     unused = [
         str(row["id"]) for row in marks if row["residual"] is None and row.get("picked_off") is None
     ]
     if unused:
-        said.append(texts.left_marks.format(names=", ".join(unused)))
+        said.append(texts.say(texts.left_marks, names=", ".join(unused)))
     return said
 
 
-def _percent(share: float) -> str:
-    return f"{100 * share:.1f} %" if share >= 0.001 else "below 0.1 %"
+def _percent(share: float, texts: Texts) -> str:
+    if share < 0.001:
+        return texts.say(texts.below, share=0.1)
+    return f"{texts.number(100 * share, '.1f')} %"

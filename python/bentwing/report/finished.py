@@ -13,9 +13,10 @@ from bentwing.map.change import Change
 from bentwing.map.finished_run import FinishedRun
 from bentwing.map.measured import moved_back
 from bentwing.map.read import read_parts
+from bentwing.map.sample import VALUES
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -53,27 +54,50 @@ class ShownRun:
             end = poses[-1].times[-1] if len(one) else end
         return cls(run, _joined(poses), tuple(offsets))
 
-    def parts(self, *, measured: bool = False) -> Iterator[tuple[Array, Array]]:
+    def parts(self) -> Iterator[tuple[Array, Array]]:
         """Yield the points (N, 3) m of the map in the trajectory's frame, with times (N,) s.
-
-        Parameters
-        ----------
-        measured : whether points are where they were before the map was refined
 
         Raises
         ------
         UsageError, InputError
         """
+        for points, times, _ in self._rows({}, 1):
+            yield points, times
+
+    def sample(self, step: int) -> Iterator[tuple[Array, Array, NDArray[np.float32]]]:
+        """Yield every `step`-th point as it was measured, before the map was refined.
+
+        Yields
+        ------
+        Points (N, 3) m in the trajectory's frame, times (N,) s, and their `VALUES` (N, 3), NaN where the
+        file of the map does not have them.
+
+        Raises
+        ------
+        UsageError, InputError
+        """
+        missing = {"shift": 0.0, **dict.fromkeys(VALUES, np.nan)}
+        for points, times, (shifts, *known) in self._rows(missing, step):
+            values = np.stack(known, axis=1).astype(np.float32)
+            values[:, VALUES.index("incidence")] *= np.radians(1.0)  # files have degrees
+            yield self._measured(points, times, shifts), times, values
+
+    def _rows(
+        self, missing: Mapping[str, float], step: int
+    ) -> Iterator[tuple[Array, Array, list[NDArray[Any]]]]:
+        """Yield every `step`-th point with its time and columns, which may be missing."""
         first = self.run.start_ns
         starts = [(flight.start_ns - first) / 1e9 for flight in self.run.flights]
         late = np.array(self._offsets) - starts
-        numbers, shifts = self._column("run_id"), self._column("shift")
+        columns, passed = self._columns({"run_id": 0, **missing}), 0
         for part in self.run.parts(local=True):
-            times = np.zeros(len(part.points)) if part.times is None else part.times
-            number = np.clip(next(numbers).astype(np.intp), 0, len(late) - 1)
-            times = times + late[number]
-            shift = next(shifts)
-            yield self._measured(part.points, times, shift) if measured else part.points, times
+            n = len(part.points)
+            chosen = slice(-passed % step, None, step)
+            passed += n
+            numbers, *rest = (np.broadcast_to(column, n)[chosen] for column in next(columns))
+            times = np.zeros(n) if part.times is None else part.times
+            own = late[np.clip(numbers.astype(np.intp), 0, len(late) - 1)]
+            yield part.points[chosen], times[chosen] + own, rest
 
     def change(self) -> Change | None:
         """Return what has changed since the map in which the run was localized; None of other runs.
@@ -98,15 +122,16 @@ class ShownRun:
         seen_from = self.trajectory.interpolate(np.clip(times, begin, end))[0]
         return moved_back(points, seen_from, shifts.astype(np.float64))
 
-    def _column(self, name: str) -> Iterator[NDArray[Any]]:
-        """Yield a column of the map part by part, and zero where it does not have it."""
+    def _columns(self, missing: Mapping[str, float]) -> Iterator[list[NDArray[Any]]]:
+        """Yield columns of the map part by part; of a file without columns a single row, again and again."""
         path = self.run.map_path
         if path is not None and path.suffix in {".las", ".laz"}:
-            from bentwing.map.read_las import las_column
+            from bentwing.map.read_las import las_columns
 
-            yield from las_column(path, name)
+            yield from las_columns(path, missing)
+            return
         while True:
-            yield np.zeros(1)
+            yield [np.full(1, value) for value in missing.values()]
 
 
 def _joined(poses: list[Trajectory]) -> Trajectory:

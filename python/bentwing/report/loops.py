@@ -3,11 +3,13 @@
 
 from __future__ import annotations
 
+from html import escape
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bentwing.report.sections import DASH, Row, table
+from bentwing.report.texts import ENGLISH
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -16,6 +18,7 @@ if TYPE_CHECKING:
 
     from bentwing.evaluate.revisits import Revisits
     from bentwing.evaluate.thickness import Thickness
+    from bentwing.report.texts import Texts
 
 _SPAN = 20.0  # s, of the flight that are one side of a loop
 _SHOWN = 12  # loops in the table, those with most patches
@@ -23,28 +26,38 @@ _FEWEST = 5  # patches that make a loop
 _WALLS = 2.0  # thicknesses of a wall that both sides may be apart
 
 
-def consistency_table(walls: Thickness | None, revisits: Revisits | None) -> str:
+def consistency_table(
+    walls: Thickness | None, revisits: Revisits | None, texts: Texts = ENGLISH
+) -> str:
     """Make the table of how well the map agrees with itself."""
     rows: list[Row] = []
     if walls is not None:
-        for name, which in (("first", ~walls.is_later), ("later", walls.is_later)):
+        for name, which in (
+            ("thickness of flat surfaces, first visits, one standard deviation", ~walls.is_later),
+            ("thickness of flat surfaces, later visits, one standard deviation", walls.is_later),
+        ):
             if np.count_nonzero(which) >= _FEWEST:
-                rows.append(_thickness(f"thickness of flat surfaces, {name} visits", walls, which))
+                rows.append(_thickness(texts.phrase(name), walls, which, texts))
     if revisits is not None:
-        rest = f"95 % below {1e3 * revisits.p95:.1f} mm, {revisits.n_patches:,} patches"
-        rows.append(
-            ("offset between two visits, standard deviation", f"{1e3 * revisits.std:.1f} mm", rest)
+        rest = texts.phrase(
+            "95 % below {p95:.1f} mm, {n:,} patches", p95=1e3 * revisits.p95, n=revisits.n_patches
         )
-    return table(("measure", "median", "spread"), rows, numbers=frozenset({1}))
+        name = texts.phrase("offset between two visits, standard deviation")
+        rows.append((name, f"{texts.number(1e3 * revisits.std, '.1f')} mm", rest))
+    head = tuple(texts.phrase(name) for name in ("measure", "median", "spread"))
+    return table(head, rows, numbers=frozenset({1}))
 
 
-def _thickness(name: str, walls: Thickness, which: NDArray[np.bool_]) -> Row:
+def _thickness(name: str, walls: Thickness, which: NDArray[np.bool_], texts: Texts) -> Row:
     p25, median, p75 = (1e3 * np.percentile(walls.stds[which], [25, 50, 75])).tolist()
-    spread = (
-        f"middle half {p25:.1f} to {p75:.1f} mm, {np.count_nonzero(which):,} patches "
-        f"of {walls.edge:g} m"
+    spread = texts.phrase(
+        "middle half {p25:.1f} to {p75:.1f} mm, {n:,} patches of {edge:g} m",
+        p25=p25,
+        p75=p75,
+        n=int(np.count_nonzero(which)),
+        edge=walls.edge,
     )
-    return f"{name}, one standard deviation", f"{median:.1f} mm", spread
+    return name, f"{texts.number(median, '.1f')} mm", spread
 
 
 def closing_table(record: Mapping[str, Any] | None, *, asked: bool) -> str:
@@ -79,38 +92,42 @@ def _named(loop: Mapping[str, Any]) -> str:
     return f"named as {what}: {first:g} s and {second:g} s"
 
 
-def revisits_table(revisits: Revisits | None, thickness: float | None) -> str:
+def revisits_table(
+    revisits: Revisits | None, thickness: float | None, texts: Texts = ENGLISH
+) -> str:
     """Make the table of loops: which stretches saw the same, and how far apart they have it.
 
     A loop is accepted whose sides lie within two thicknesses of a wall of each other.
     """
     if revisits is None:
-        return '<p class="none">No flat surface was seen in two visits.</p>'
+        return f'<p class="none">{texts.phrase("No flat surface was seen in two visits.")}</p>'
     limit = max(_WALLS * (thickness or 0.0), 1e-3)
     loops = _loops(revisits)
     rows = [
         (
             f"{a:.0f} {DASH} {a + _SPAN:.0f} s",
             f"{b:.0f} {DASH} {b + _SPAN:.0f} s",
-            f"{len(offsets):,}",
-            f"{1e3 * float(np.median(np.abs(offsets))):.1f} mm",
-            f"{1e3 * float(np.percentile(np.abs(offsets), 95)):.1f} mm",
-            "agrees" if float(np.median(np.abs(offsets))) <= limit else "does not agree",
+            texts.number(len(offsets), ","),
+            f"{texts.number(1e3 * float(np.median(np.abs(offsets))), '.1f')} mm",
+            f"{texts.number(1e3 * float(np.percentile(np.abs(offsets), 95)), '.1f')} mm",
+            texts.phrase(
+                "agrees" if float(np.median(np.abs(offsets))) <= limit else "does not agree"
+            ),
         )
         for a, b, offsets in loops[:_SHOWN]
     ]
     if not rows:
-        return '<p class="none">No two stretches share enough flat surface.</p>'
+        return f'<p class="none">{texts.phrase("No two stretches share enough flat surface.")}</p>'
     n_good = sum(float(np.median(np.abs(o))) <= limit for _, _, o in loops)
     head = (
-        "seen at",
-        "seen again at",
-        "patches",
-        "median offset",
+        *map(texts.phrase, ("seen at", "seen again at", "patches", "median offset")),
         "95 %",
-        f"within {1e3 * limit:.0f} mm",
+        texts.phrase("within {limit:.0f} mm", limit=1e3 * limit),
     )
-    note = f'<p class="none">{n_good} of {len(loops)} loops agree; those with most patches are listed.</p>'
+    said = texts.phrase(
+        "{good} of {n} loops agree; those with most patches are listed.", good=n_good, n=len(loops)
+    )
+    note = f'<p class="none">{escape(said)}</p>'
     return table(head, rows, numbers=frozenset({0, 1, 2, 3, 4})) + note
 
 

@@ -6,15 +6,18 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from bentwing.report.sections import DASH, table
+from bentwing.report.texts import ENGLISH
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
+
+    from bentwing.report.texts import Texts
 
 _HEAD = ("one", "other", "votes", "keypoints", "overlap", "agreement", "apart, mm", "verdict")
 _NUMBERS = frozenset({2, 3, 4, 5, 6})
 
 
-def merging_section(merging: Mapping[str, Any] | None) -> str:
+def merging_section(merging: Mapping[str, Any] | None, texts: Texts = ENGLISH) -> str:
     """Make the tables of maps and of all pairs of places that were considered; empty without any."""
     if not merging:
         return ""
@@ -22,10 +25,11 @@ def merging_section(merging: Mapping[str, Any] | None) -> str:
     accepted = [c for c in candidates if c["accepted"]]
     others = [c for c in candidates if not c["accepted"]]
     parts = [
-        "<h2>Places seen by more than one</h2>",
+        f"<h2>{texts.phrase('Places seen by more than one')}</h2>",
         _groups(merging),
-        f"<h3>Accepted ({len(accepted)})</h3>{_table(accepted)}",
-        f"<details><summary>Rejected ({len(others)}), with the reason</summary>{_table(others)}</details>",
+        f"<h3>{texts.phrase('Accepted ({n})', n=len(accepted))}</h3>{_table(accepted)}",
+        f"<details><summary>{texts.phrase('Rejected ({n}), with the reason', n=len(others))}</summary>"
+        f"{_table(others)}</details>",
     ]
     return "".join(parts)
 

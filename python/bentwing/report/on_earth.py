@@ -8,18 +8,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bentwing.report.sections import MINUS, shares_table, table
+from bentwing.report.texts import ENGLISH
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from bentwing.report.sections import Row
+    from bentwing.report.texts import Texts
+
 _TOLD = {
     "messages", "fixes", "used", "rejected", "rms_horizontal", "rms_vertical", "runs", "leap_seconds",
 }  # fmt: skip
 _QUALITY = "of_quality_"
 
 
-def on_earth_section(found: Mapping[str, Any] | None) -> str:
+def on_earth_section(found: Mapping[str, Any] | None, texts: Texts = ENGLISH) -> str:
     """Make the table of place, heading and fixes; empty where the map is in its own frame."""
     if not found:
         return ""
@@ -31,9 +34,11 @@ def on_earth_section(found: Mapping[str, Any] | None) -> str:
         )
     shares = ""
     if fixes.get("runs"):
-        shares = f"<h3>GNSS fixes of the runs</h3>{shares_table(fixes['runs'])}"
+        shares = f"<h3>{texts.phrase('GNSS fixes of the runs')}</h3>{shares_table(fixes['runs'])}"
     name = "Place on the Earth" if "epsg" in found else "Place in the frame of the control points"
-    return f"<section><h2>{name}</h2>{table(('what', 'value'), rows)}{shares}</section>"
+    return (
+        f"<section><h2>{texts.phrase(name)}</h2>{table(('what', 'value'), rows)}{shares}</section>"
+    )
 
 
 def _place(found: Mapping[str, Any]) -> list[Row]:

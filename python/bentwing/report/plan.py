@@ -9,7 +9,7 @@ from html import escape
 from typing import TYPE_CHECKING, TypeAlias
 
 from bentwing.report.colours import HEIGHT
-from bentwing.report.lettering import coordinate, multiples
+from bentwing.report.lettering import multiples
 from bentwing.report.picture import encode_png
 from bentwing.report.svg import (
     FAINT,
@@ -21,6 +21,7 @@ from bentwing.report.svg import (
     scale_bar,
     text,
 )
+from bentwing.report.texts import ENGLISH
 from bentwing.report.way import draw_way
 
 if TYPE_CHECKING:
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
 
     from bentwing.report.frame import ShownFrame
     from bentwing.report.picture import View
+    from bentwing.report.texts import Texts
     from bentwing.report.way import Way
 
 _LEFT, _FOOT, _TOP, _SIZE = 38, 100, 30, 22  # pixels: margins, and the height of letters
@@ -64,7 +66,8 @@ def draw_plan(
     marks: Sequence[Mark] = (),
     table: tuple[str, ...] = HEIGHT,
     key: Sequence[tuple[str, str]] = (),
-    name: str = "Plan",
+    name: str | None = None,
+    texts: Texts = ENGLISH,
 ) -> str:
     """Draw a plan as SVG.
 
@@ -77,21 +80,30 @@ def draw_plan(
     table : colour map of the heights
     key : colours of other things, and what these are
     name : says what is seen, for those who cannot see it
+    texts : words of the language
     """
+    ends = (texts.number(v, ".1f") for v in (round(view.low, 1) + 0.0, round(view.high, 1) + 0.0))
     height, width, _ = view.image.shape
     data = base64.b64encode(encode_png(view.image)).decode("ascii")
     wide = max(width, least_width(_SIZE))
     foot = height + 32.0 + _SIZE
     parts = [
-        open_svg(wide + _LEFT, height + _TOP + _FOOT, name),
+        open_svg(wide + _LEFT, height + _TOP + _FOOT, name or texts.plan),
         f'<g transform="translate({_LEFT} {_TOP})">',
         f'<image width="{width}" height="{height}" href="data:image/png;base64,{data}"/>',
         f'<rect width="{width}" height="{height}" fill="none" stroke="{FAINT}"/>',
-        *_grid(view, frame.origin),
+        *_grid(view, frame.origin, texts),
         draw_way(view, way),
         *_marked(marks, view),
         *scale_bar(view, foot, _SIZE),
-        *legend(view, "height, m", table, (float(wide), foot - 10.0), _SIZE),
+        *legend(
+            view,
+            texts.height_legend,
+            table,
+            (float(wide), foot - 10.0),
+            _SIZE,
+            (next(ends), next(ends)),
+        ),
         *_key(key, float(wide), foot),
     ]
     if frame.is_north_up:
@@ -99,7 +111,7 @@ def draw_plan(
     return "".join([*parts, "</g></svg>"])
 
 
-def _grid(view: View, origin: NDArray[np.float64]) -> list[str]:
+def _grid(view: View, origin: NDArray[np.float64], texts: Texts) -> list[str]:
     """Lines at round coordinates, with these at the left and below."""
     height, width, _ = view.image.shape
     left, top, pixel = view.left + origin[0], view.top + origin[1], view.pixel
@@ -111,7 +123,7 @@ def _grid(view: View, origin: NDArray[np.float64]) -> list[str]:
         at = (x - left) / pixel
         parts.append(_line(f"M{at:.1f} 0V{height}"))
         if 30 < at < width - 30:
-            parts.append(text(at, height + 5 + _SIZE, coordinate(x), "middle", INK, _SIZE))
+            parts.append(text(at, height + 5 + _SIZE, _coordinate(x, texts), "middle", INK, _SIZE))
     for y in multiples(bottom, top, step):
         at = (top - y) / pixel
         parts.append(_line(f"M0 {at:.1f}H{width}"))
@@ -119,9 +131,14 @@ def _grid(view: View, origin: NDArray[np.float64]) -> list[str]:
             turned = f'transform="rotate(-90 -10 {at:.1f})"'
             parts.append(
                 f'<text x="-10" y="{at:.1f}" {turned} text-anchor="middle" fill="{INK}" '
-                f'font-size="{_SIZE}">{coordinate(y)}</text>'
+                f'font-size="{_SIZE}">{_coordinate(y, texts)}</text>'
             )
     return parts
+
+
+def _coordinate(value: float, texts: Texts) -> str:
+    """Write a coordinate of a grid: whole metres without a fraction."""
+    return texts.number(value + 0.0, ",.0f" if abs(value) >= 10 else "g")
 
 
 def _key(key: Sequence[tuple[str, str]], right: float, y: float) -> list[str]:

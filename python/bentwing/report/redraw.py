@@ -16,6 +16,7 @@ from bentwing.base.progress import as_progress
 from bentwing.base.provenance import describe_input
 from bentwing.base.run_record import RECORD
 from bentwing.evaluate.revisits import revisit_consistency
+from bentwing.map.sample import VALUES
 from bentwing.report.finished import ShownRun
 from bentwing.report.page import write_report
 from bentwing.report.pdf import find_browser, write_pdf
@@ -71,12 +72,13 @@ def redraw_report(
     try:
         _forget(folder, record)
         with shown.stage("draw the report"):
-            points, times = _sample(finished)
+            points, times, values = _sample(finished)
             write_report(
                 folder / PAGE,
                 run_json=record,
                 trajectory=finished.trajectory,
                 map_sample=(points, times),
+                map_values=values,
                 revisits=revisit_consistency(points, times) if len(points) else None,
                 change=finished.change(),
             )
@@ -92,21 +94,18 @@ def redraw_report(
     return written
 
 
-def _sample(finished: ShownRun) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return every k-th point of the map and its time, in the order of time."""
+def _sample(
+    finished: ShownRun,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float32]]:
+    """Return every k-th point of the map, its time and its `VALUES`, in the order of time."""
     n = int((finished.run.record.get("counts") or {}).get("map.written", 0))
     step = 1
     while n > step * _MOST:
         step *= 2
-    skipped = 0
-    points, times = [np.empty((0, 3))], [np.empty(0)]
-    drawn = finished.parts(measured=True) if finished.run.map_path is not None else ()
-    for places, moments in drawn:
-        chosen = slice(-skipped % step, None, step)
-        points.append(places[chosen])
-        times.append(moments[chosen])
-        skipped += len(places)
-    return np.concatenate(points), np.concatenate(times)
+    nothing = (np.empty((0, 3)), np.empty(0), np.empty((0, len(VALUES)), np.float32))
+    drawn = finished.sample(step) if finished.run.map_path is not None else ()
+    points, times, values = (np.concatenate(part) for part in zip(nothing, *drawn, strict=True))
+    return points, times, values
 
 
 def _forget(folder: Path, record: dict[str, Any]) -> None:

@@ -29,7 +29,7 @@ const startScene = (figure) => {
 
   const points = program(
     `uniform mat4 camera; uniform vec3 origin, low, high; uniform float step, size; uniform vec2 heights;
-     uniform bool byTime, isPath; uniform vec3 table[9];
+     uniform bool byHeight, isPath; uniform vec3 table[9];
      in vec3 place; in float value; out vec3 colour;
      vec3 shade(float x) {
        float at = clamp(x, 0.0, 1.0) * 8.0; int i = min(int(at), 7);
@@ -40,8 +40,9 @@ const startScene = (figure) => {
        bool isCut = !isPath && (any(lessThan(p, low)) || any(greaterThan(p, high)));
        gl_Position = isCut ? vec4(9.0, 9.0, 9.0, 1.0) : camera * vec4(p, 1.0);
        gl_PointSize = clamp(size, 1.5, 9.0);
-       float x = byTime ? value : (p.z - heights.x) / max(heights.y - heights.x, 1e-6);
-       colour = isPath ? mix(vec3(0.12, 0.16, 0.2), vec3(0.78, 0.25, 0.18), value) : shade(x);
+       float x = byHeight ? (p.z - heights.x) / max(heights.y - heights.x, 1e-6) : value / 254.0;
+       bool isUnknown = !byHeight && value > 254.5;
+       colour = isPath ? mix(vec3(0.12, 0.16, 0.2), vec3(0.78, 0.25, 0.18), value) : isUnknown ? vec3(0.7) : shade(x);
      }`,
     `uniform bool isPath; in vec3 colour; out vec4 pixel;
      void main() {
@@ -67,16 +68,19 @@ const startScene = (figure) => {
   const buffer = (places, values) => {
     const made = gl.createVertexArray();
     gl.bindVertexArray(made);
+    let last = null; // the buffer of the values, which change with the colour
     for (const [name, n, kind, array] of [["place", 3, gl.UNSIGNED_SHORT, places], ["value", 1, gl.UNSIGNED_BYTE, values]]) {
-      gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
+      last = gl.createBuffer();
+      gl.bindBuffer(gl.ARRAY_BUFFER, last);
       gl.bufferData(gl.ARRAY_BUFFER, array, gl.STATIC_DRAW);
       const at = gl.getAttribLocation(points, name);
       gl.enableVertexAttribArray(at);
-      gl.vertexAttribPointer(at, n, kind, name === "value", 0, 0);
+      gl.vertexAttribPointer(at, n, kind, false, 0, 0);
     }
-    return { made, n: values.length };
+    return { made, n: values.length, values: last };
   };
-  const cloud = buffer(bytes(data.points), bytes(data.times));
+  const codes = Object.fromEntries(data.colours.map((c) => [c.name, c.codes && bytes(c.codes)]));
+  const cloud = buffer(bytes(data.points), codes.time);
   const path = buffer(bytes(data.path), bytes(data.unsure));
 
   const target = gl.createFramebuffer();
@@ -95,10 +99,10 @@ const startScene = (figure) => {
   const colours = texture(gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE, gl.COLOR_ATTACHMENT0);
   const depths = texture(gl.DEPTH_COMPONENT24, gl.DEPTH_COMPONENT, gl.UNSIGNED_INT, gl.DEPTH_ATTACHMENT);
 
-  const places = new Uint16Array(bytes(data.points).buffer), ages = bytes(data.times);
+  const places = new Uint16Array(bytes(data.points).buffer);
   const size = data.high.map((x, i) => x - data.low[i]);
   const oblique = { turn: -0.5, lift: 0.6 };
-  const view = { ...oblique, at: [...data.centre], scale: 1, byTime: false, low: [...data.low], high: [...data.high] };
+  const view = { ...oblique, at: [...data.centre], scale: 1, colour: data.colours[0], low: [...data.low], high: [...data.high] };
   view.high[2] = data.cut;
 
   // All views are orthographic, so that the scale bar is true everywhere.
@@ -150,9 +154,9 @@ const startScene = (figure) => {
     gl.uniform3fv(uniform(points, "high"), view.high);
     gl.uniform1f(uniform(points, "step"), data.step);
     gl.uniform1f(uniform(points, "size"), data.spacing * view.scale * ratio);
-    gl.uniform2fv(uniform(points, "heights"), data.heights);
-    gl.uniform1i(uniform(points, "byTime"), view.byTime);
-    gl.uniform3fv(uniform(points, "table"), table(view.byTime ? data.time_colours : data.height_colours));
+    gl.uniform2fv(uniform(points, "heights"), data.colours[0].range);
+    gl.uniform1i(uniform(points, "byHeight"), !view.colour.codes);
+    gl.uniform3fv(uniform(points, "table"), table(view.colour.table));
     gl.uniform1i(uniform(points, "isPath"), 0);
     gl.bindVertexArray(cloud.made);
     gl.drawArrays(gl.POINTS, 0, cloud.n);
@@ -180,17 +184,17 @@ const startScene = (figure) => {
   let asked = 0;
   const redraw = () => { asked = asked || requestAnimationFrame(() => { asked = 0; draw(); }); };
 
+  const number = (x, digits) => x.toFixed(digits).replace(".", data.decimal);
   const part = (name) => figure.querySelector(`[data-part="${name}"]`);
   const drawScale = () => {
     const longest = canvas.clientWidth / 4 / view.scale, magnitude = 10 ** Math.floor(Math.log10(longest));
     const metres = [5, 2, 1].map((m) => m * magnitude).find((m) => m <= longest);
     part("bar").style.width = `${metres * view.scale}px`;
     part("length").textContent = metres >= 1 ? `${metres} m` : `${Math.round(1000 * metres)} mm`;
-    const codes = view.byTime ? data.time_colours : data.height_colours;
-    part("colours").style.background = `linear-gradient(to right, ${codes.map((c) => "#" + c).join(",")})`;
-    const [low, high] = view.byTime ? data.seconds : data.heights, unit = view.byTime ? "s" : "m";
-    part("lowest").textContent = `${low.toFixed(1)} ${unit}`;
-    part("highest").textContent = `${high.toFixed(1)} ${unit}`;
+    const { table, range: [low, high], isPart } = view.colour;
+    const legend = isPart ? `${view.colour.legend}; ${data.words.unknown}` : view.colour.legend;
+    part("colours").style.background = `linear-gradient(to right, ${table.map((c) => "#" + c).join(",")})`;
+    [part("what").textContent, part("lowest").textContent, part("highest").textContent] = [legend, number(low, 1), number(high, 1)];
   };
 
   // A distance between two points of the map that are picked.
@@ -218,7 +222,8 @@ const startScene = (figure) => {
     const { R, place, middle } = data.to_map, gap = p.map((x, i) => x - place[i]);
     return R.map((row, i) => (dot(row, gap) + middle[i]).toFixed(4));
   };
-  const seconds = (p) => (data.seconds[0] + (data.seconds[1] - data.seconds[0]) * ages[p.at] / 255).toFixed(1);
+  const [first, last] = data.colours.find((c) => c.name === "time").range;
+  const seconds = (p) => (first + (last - first) * codes.time[p.at] / 254).toFixed(1);
   const contents = {
     points: () => ["points.csv", "id,x,y,z,map_x,map_y,map_z\n" + taken.map((p, i) => `P${i + 1},,,,${inMap(p)}\n`).join("")],
     loop: () => ["loops.yaml", `loops:\n- times: [${taken.slice(-2).map(seconds).join(", ")}]\n`],
@@ -240,8 +245,8 @@ const startScene = (figure) => {
     else if (picked.length < 2) told.textContent = data.words[picked.length ? "second" : "first"];
     else {
       const gap = picked[1].map((x, i) => x - picked[0][i]);
-      const [level, whole] = [Math.hypot(gap[0], gap[1]), Math.hypot(...gap)].map((x) => x.toFixed(3));
-      told.textContent = data.words.distance.replace("{whole}", whole).replace("{level}", level).replace("{up}", gap[2].toFixed(3));
+      const [level, whole] = [Math.hypot(gap[0], gap[1]), Math.hypot(...gap)].map((x) => number(x, 3));
+      told.textContent = data.words.apart.replace("{whole}", whole).replace("{level}", level).replace("{up}", number(gap[2], 3));
     }
   };
 
@@ -313,23 +318,31 @@ const startScene = (figure) => {
   });
 
   const looks = { oblique, top: { turn: 0, lift: Math.PI / 2 }, front: { turn: 0, lift: 0 }, side: { turn: Math.PI / 2, lift: 0 } };
+  const paint = (name) => {
+    view.colour = data.colours.find((c) => c.name === name);
+    for (const { name: other } of data.colours) figure.querySelector(`button[value=${other}]`).ariaPressed = other === name;
+    if (!codes[name]) return;
+    gl.bindBuffer(gl.ARRAY_BUFFER, cloud.values);
+    gl.bufferData(gl.ARRAY_BUFFER, codes[name], gl.STATIC_DRAW);
+  };
   const press = (button) => {
     const { value } = button;
     if (contents[value]) { save(value); return; }
     if (looks[value]) { Object.assign(view, looks[value], { isMoved: false }); fit(); }
     else if (value === "measure") { view.isMeasuring = !view.isMeasuring; picked.length = 0; button.ariaPressed = view.isMeasuring; }
-    else view.byTime = value === "time";
+    else paint(value);
     redraw();
   };
   for (const button of figure.querySelectorAll("button")) button.addEventListener("click", () => press(button));
   for (const slider of figure.querySelectorAll("input[type=range]")) { // one side of the clip box
     const side = slider.dataset.side, axis = Number(slider.dataset.axis), told = slider.nextElementSibling;
-    const tell = () => { told.textContent = `${(view[side][axis] + data.shown[axis]).toFixed(2)} m`; };
+    const tell = () => { told.textContent = `${number(view[side][axis] + data.shown[axis], 2)} m`; };
     [slider.min, slider.max, slider.step] = [data.low[axis], data.high[axis], "any"];
     slider.value = view[side][axis];
     slider.addEventListener("input", () => { view[side][axis] = Number(slider.value); tell(); redraw(); });
     tell();
   }
+  paint(view.colour.name);
   new ResizeObserver(redraw).observe(canvas);
   redraw();
 };

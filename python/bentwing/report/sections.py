@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bentwing.base.spans import name_spans
 from bentwing.base.trajectory import Trajectory
 from bentwing.evaluate.expected import ExpectedAccuracy
 from bentwing.report.picture import thinned
@@ -35,27 +36,54 @@ _BEFORE_UNIT = re.compile(r"(?<=\d) (?=(?:mm|m|%|s)\b)")
 def verdict(record: Mapping[str, Any], texts: Texts = ENGLISH) -> str:
     """State in one box whether the result can be used as it is, and how accurate it is."""
     found = record.get("verdict") or {}
-    reasons = [f"{r['sentence']}: {r['advice']}" for r in found.get("reasons") or []]
+    reasons = [_reason(reason, texts) for reason in found.get("reasons") or []]
     warnings = [str(warning) for warning in record.get("warnings") or []]
     if not record.get("complete", False):
         stage, reason = record.get("stage", "?"), record.get("reason") or "not finished"
         level, headline = "bad", texts.incomplete
-        sentence = texts.stopped.format(stage=stage, reason=reason)
+        sentence = texts.say(texts.stopped, stage=stage, reason=reason)
     else:
         state = found.get("state", "good")
         level = {"good": "good", "doubtful": "warn", "failed": "bad"}[state]
-        headline = found.get("headline") or texts.finished
+        headline = texts.headlines[state] if found else texts.finished
         sentence = expected(record, texts)
     items = "".join(f"<li>{escape(capital(reason))}.</li>" for reason in reasons)
-    listed = _set_up(record.get("set_up") or []) + (f"<ul>{items}</ul>" if items else "")
+    listed = _set_up(record.get("set_up") or [], texts) + (f"<ul>{items}</ul>" if items else "")
     if warnings:
-        items = "".join(f"<li>{escape(warning)}</li>" for warning in warnings)
+        items = "".join(f'<li lang="en">{escape(warning)}</li>' for warning in warnings)
         listed += f"<p>{texts.worth_knowing}</p><ul>{items}</ul>"
     said = f"<p>{escape(sentence)}</p>" if sentence else ""
     return f'<div class="verdict {level}"><strong>{SIGNS[level]} {escape(headline)}</strong>{said}{listed}</div>'
 
 
-def _set_up(findings: Sequence[Mapping[str, Any]]) -> str:
+def _reason(reason: Mapping[str, Any], texts: Texts) -> str:
+    """Say a reason in the language of the report, as far as run.json has what it takes."""
+    found = texts.findings.get(reason["kind"])
+    if found is None:
+        return f"{reason['sentence']}: {reason['advice']}"
+    value = reason["value"] if reason["value"] is not None else np.inf
+    measured = {"value": value, "percent": 100 * value, "when": "", **(reason.get("facts") or {})}
+    spans = reason.get("spans") or []
+    if spans:
+        measured["when"] = f" {named_spans(spans, texts)}"
+    try:
+        said = texts.say(found[0], **measured)
+    except KeyError:  # of an earlier version, without facts
+        said = str(reason["sentence"])
+    return f"{said}: {found[1]}"
+
+
+def named_spans(spans: Sequence[Sequence[float]], texts: Texts) -> str:
+    """Name stretches of time, of many the longest."""
+    return name_spans(
+        [(first, last) for first, last in spans],
+        one=lambda first, last: texts.say(texts.span, first=first, last=last),
+        others=lambda n: texts.say(texts.shorter, n=n),
+        conjunction=texts.conjunction,
+    )
+
+
+def _set_up(findings: Sequence[Mapping[str, Any]], texts: Texts) -> str:
     """Say what was found of the head that the payload, if there was one, does not say."""
     if not findings:
         return ""
@@ -63,10 +91,7 @@ def _set_up(findings: Sequence[Mapping[str, Any]]) -> str:
         f"<li>{escape(capital(f['sentence']))}: <code>{escape(f['line'])}</code></li>"
         for f in findings
     )
-    return (
-        "<p>The recording shows of the sensor head what no payload told, or told otherwise, and was mapped "
-        f"with it. Write into payload.yaml:</p><ul>{items}</ul>"
-    )
+    return f"<p>{escape(texts.set_up)}</p><ul>{items}</ul>"
 
 
 def capital(sentence: str) -> str:
@@ -79,12 +104,37 @@ def expected(record: Mapping[str, Any], texts: Texts) -> str:
     found = record.get("expected_accuracy")
     checked = ((record.get("georeference") or {}).get("residuals") or {}).get("check")
     if found:
-        said = ExpectedAccuracy(**found).sentence()
+        said = _accuracy(ExpectedAccuracy(**found), texts)
     elif checked:
-        said = texts.accuracy_checked.format(rms=1e3 * checked["rms"], n=checked["n"])
+        said = texts.say(texts.accuracy_checked, rms=1e3 * checked["rms"], n=checked["n"])
     else:
         said = texts.accuracy_none
     return _BEFORE_UNIT.sub("\N{NO-BREAK SPACE}", said)
+
+
+def _accuracy(found: ExpectedAccuracy, texts: Texts) -> str:
+    whole, short = (
+        texts.say(
+            texts.accuracy_of,
+            horizontal=_length(h, texts),
+            vertical=_length(v, texts),
+            heading=np.degrees(turn),
+        )
+        for h, v, turn in (
+            (found.horizontal, found.vertical, found.heading),
+            (found.horizontal_per_10m, found.vertical_per_10m, found.heading_per_10m),
+        )
+    )
+    said = texts.say(texts.accuracy, whole=whole, short=short)
+    if found.map_thickness is not None:
+        said += "; " + texts.say(texts.accuracy_map, mm=1e3 * found.map_thickness)
+    return f"{said}."
+
+
+def _length(metres: float, texts: Texts) -> str:
+    if metres >= 0.1:
+        return f"{texts.number(metres, '.2f')} m"
+    return f"{texts.number(1e3 * metres, '.2g' if metres < 0.01 else '.0f')} mm"
 
 
 def quality(windows: Sequence[Mapping[str, Any]]) -> str:
@@ -109,16 +159,16 @@ def tiles(
     counts = record.get("counts") or {}
     facts: list[tuple[str, str]] = []
     if coverage is not None:
-        facts.append((f"{coverage.area:,.0f} m²", texts.area))
-        facts.append((f"{coverage.volume:,.0f} m³", texts.volume))
+        facts.append((f"{texts.number(coverage.area, ',.0f')} m²", texts.area))
+        facts.append((f"{texts.number(coverage.volume, ',.0f')} m³", texts.volume))
     if len(trajectory.times) > 1:
         parts = _parts(trajectory)
         duration = sum(float(part.times[-1] - part.times[0]) for part in parts)
-        facts.append((f"{sum(map(path_length, parts)):,.0f} m", texts.length))
+        facts.append((f"{texts.number(sum(map(path_length, parts)), ',.0f')} m", texts.length))
         facts.append((clock(duration), texts.duration))
     if "map.points" in counts:
         n_points = counts.get("map.written", counts["map.points"])
-        facts.append((_amount(n_points), texts.points))
+        facts.append((_amount(n_points, texts), texts.points))
     if len(points):
         size = np.subtract(*np.percentile(thinned(points), [99.8, 0.2], axis=0))
         facts.append(
@@ -140,7 +190,9 @@ def refinement_sentence(found: Mapping[str, Any] | None, texts: Texts) -> str:
     if not found.get("moved"):
         return f"<p>{escape(texts.nothing_refined)}</p>"
     move, before, after = (1000 * found[name] for name in ("move", "sigma_before", "sigma"))
-    said = texts.refined.format(share=100 * found["moved"], move=move, before=before, after=after)
+    said = texts.say(
+        texts.refined, share=100 * found["moved"], move=move, before=before, after=after
+    )
     return f"<p>{escape(said)}</p>"
 
 
@@ -257,10 +309,10 @@ def _value(value: object, *, are_amounts: bool) -> str:
     return str(value)
 
 
-def _amount(n: int) -> str:
-    if n >= 10_000_000:
-        return f"{n / 1e6:.0f} M"
-    return f"{n / 1e6:.1f} M" if n >= 1_000_000 else f"{n:,}"
+def _amount(n: int, texts: Texts) -> str:
+    if n < 1_000_000:
+        return texts.number(n, ",")
+    return f"{texts.number(n / 1e6, '.0f' if n >= 10_000_000 else '.1f')} {texts.million}"
 
 
 def clock(seconds: float) -> str:

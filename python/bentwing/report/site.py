@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
 
+_JOINS = 6  # pairs of recordings that are named
 _LEVELS = {"good": "good", "doubtful": "warn", "failed": "bad", "refused": "bad"}
 
 
@@ -67,10 +68,15 @@ def _summary(record: Mapping[str, Any]) -> str:
             f"Not all runs have places in common. These are {len(groups)} separate maps, whose "
             f"relative poses are unknown: {islands}"
         )
-    level = "bad" if bad or record["failure"] else "warn" if len(groups) > 1 else "good"
+    doubted = [one for one in groups if len(one["runs"]) > 1 and one["state"] != "good"]
+    said += [f"{', '.join(one['runs'])} ({one['state']}): {one['reason']}" for one in doubted]
+    is_doubted = len(groups) > 1 or doubted
+    level = "bad" if bad or record["failure"] else "warn" if is_doubted else "good"
     headline = {
         "good": "All recordings are mapped",
-        "warn": "All recordings are mapped, into separate maps",
+        "warn": "All recordings are mapped, into separate maps"
+        if len(groups) > 1
+        else "All recordings are mapped, but the map is to be checked",
         "bad": "Not all recordings could be mapped" if bad else "The runs were not merged",
     }[level]
     items = "".join(f"<li>{escape(sentence)}</li>" for sentence in said)
@@ -84,11 +90,35 @@ def _maps(groups: Sequence[Mapping[str, Any]]) -> str:
             _picture(one["folder"], ", ".join(one["runs"])),
             _link(", ".join(one["runs"]), one["folder"]),
             _state(one),
-            f"{one['n_links']}" if len(one["runs"]) > 1 else "belongs to no other",
+            _rests_on(one),
         )
         for one in groups
     ]
-    return "<h2>Maps</h2>" + _table(("", "recordings", "state", "places that join them"), rows)
+    return "<h2>Maps</h2>" + _table(
+        ("", "recordings", "state", "what their positions rest on"), rows
+    )
+
+
+def _rests_on(group: Mapping[str, Any]) -> str:
+    """Say by what the runs of a map hang together, the weakest first."""
+    if len(group["runs"]) == 1:
+        return "belongs to no other"
+    joins = sorted(group.get("joins") or [], key=lambda one: (one["n_places"], one["has_loop"]))
+    if not joins:
+        return escape(f"{group['n_links']} places in common")
+    said = [_join(one) for one in joins[:_JOINS]]
+    if len(joins) > _JOINS:
+        said.append(f"and {len(joins) - _JOINS} more pairs of recordings")
+    return "<br>".join(map(escape, said))
+
+
+def _join(one: Mapping[str, Any]) -> str:
+    a, b = one["runs"]
+    n = one["n_places"]
+    if n == 1 and not one["has_loop"]:
+        return f"{b} and {a}: a single place; no other place and no loop of recordings confirms it"
+    found = "one place" if n == 1 else f"{n} places"
+    return f"{b} and {a}: {found}{', confirmed by a loop of recordings' if one['has_loop'] else ''}"
 
 
 def _places(record: Mapping[str, Any]) -> str:

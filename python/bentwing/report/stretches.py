@@ -7,12 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bentwing.base.spans import name_spans, spans_of
+from bentwing.base.spans import spans_of
+from bentwing.report.sections import named_spans
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
+
+    from bentwing.report.texts import Texts
 
 
 def degenerate(
@@ -29,12 +32,9 @@ def degenerate_spans(windows: Sequence[Mapping[str, Any]]) -> list[tuple[float, 
     return spans_of((float(w["time"]), bool(w.get("degenerate"))) for w in windows)
 
 
-def spans_sentence(spans: Sequence[tuple[float, float]]) -> str:
+def spans_sentence(spans: Sequence[tuple[float, float]], texts: Texts) -> str:
     """Say where they are, for a caption."""
     if not spans:
-        return "Every direction of motion was seen all the time."
+        return texts.seen_all
     total = sum(last - first for first, last in spans)
-    return (
-        f"Red: for {total:.0f} s the surroundings left a direction of motion unseen "
-        f"({name_spans(spans)}); inertial data and smoothness carried it there."
-    )
+    return texts.say(texts.seen_not, total=total, spans=named_spans(spans, texts))

@@ -14,6 +14,7 @@ from bentwing.report.picture import paint, project, render
 from bentwing.report.plan import draw_plan
 from bentwing.report.stretches import degenerate
 from bentwing.report.svg import map_view
+from bentwing.report.texts import ENGLISH
 from bentwing.report.way import Way
 
 if TYPE_CHECKING:
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 
     from bentwing.base.trajectory import Trajectory
     from bentwing.report.plan import Mark
+    from bentwing.report.texts import Texts
 
 _WAY = ("1f2933", "c8412e")  # seen in all directions, and not
 SLAB = 1.0  # m, thickness of the section
@@ -57,6 +59,7 @@ def draw_views(
     *,
     frame: ShownFrame | None = None,
     marks: Sequence[Mark] = (),
+    texts: Texts = ENGLISH,
 ) -> MapViews:
     """Draw all views of a map.
 
@@ -68,6 +71,7 @@ def draw_views(
     windows : records of the estimate; where one is degenerate the path is red
     frame : of points and trajectory; default: the map's own
     marks : surveyed points
+    texts : words of the language
     """
     overhead = overhead_points(points, times, trajectory)
     along, beside = _directions(points)
@@ -83,11 +87,11 @@ def draw_views(
     slab = np.abs((points - centre) @ beside) < SLAB / 2
     shown = frame or ShownFrame()
     return MapViews(
-        plan=draw_plan(by_height, shown, way=way, marks=marks),
-        oblique=oblique_view(plan, plan[:, 2], "height, m"),
-        plan_time=map_view(by_time, "time, s", TIME, name="Plan by time"),
-        side=_upright(points, along, beside, "Side view"),
-        section=_upright(points[slab], along, beside, "Section"),
+        plan=draw_plan(by_height, shown, way=way, marks=marks, texts=texts),
+        oblique=oblique_view(plan, plan[:, 2], texts.height_legend),
+        plan_time=map_view(by_time, texts.time_legend, TIME, name=texts.by_time),
+        side=_upright(points, along, beside, texts.side, texts),
+        section=_upright(points[slab], along, beside, texts.section, texts),
         ceiling=ceiling_of(points[overhead, 2]),
         is_north_up=shown.is_north_up,
     )
@@ -165,11 +169,12 @@ def _upright(
     along: NDArray[np.float64],
     beside: NDArray[np.float64],
     name: str,
+    texts: Texts,
 ) -> str:
     across, up, toward = points @ along, points[:, 2], -(points @ beside)
     # gaps stay, because closing them would make walls look thicker than they are
     view = render(across, up, toward, up, max_height=420, close_gaps=0)
-    return map_view(view, "height, m", HEIGHT, name=name, text_size=22)
+    return map_view(view, texts.height_legend, HEIGHT, name=name, text_size=22)
 
 
 def _directions(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

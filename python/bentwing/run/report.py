@@ -73,6 +73,7 @@ def _write(
             run_json={**folder.described(), "complete": complete},
             trajectory=trajectory,
             map_sample=(points, times),
+            map_values=found.sample.values,
             revisits=None if found.map is None else found.map.revisits,
             change=None if found.map is None else found.map.change,
             spin=found.spin.series,

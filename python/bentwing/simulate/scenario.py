@@ -46,6 +46,7 @@ class Scenario(Settings):
     things_seed : varies what stands in a `courtyard`, `office` or `carpark`, and neither walls nor pillars:
         another storey that is built alike; by default `seed` does
     boxes : that stand on the free ground of a tour, each flight's elsewhere: another day in the world of `seed`
+    spheres : of 0.1 m radius that stand on posts as control marks, the same in all flights of a world
     format : of the recording: a ROS 1 bag, or a ROS 2 folder with mcap or sqlite storage
     motor_rate : rad/s, of a motor-turned head
     spin : of `hokuyo-spin`: a `steady` rate that wanders a little, or driven by the simulated `plant`
@@ -71,6 +72,7 @@ class Scenario(Settings):
     flight_seed: int | None = Field(default=None, ge=0, le=2**63 - 1)
     things_seed: int | None = Field(default=None, ge=0, le=2**63 - 1)
     boxes: int = Field(default=0, ge=0, le=100)
+    spheres: int = Field(default=0, ge=0, le=20)
     format: RecordingFormat = "bag"
     motor_rate: float = Field(default=1.0, gt=0.0, le=10.0)
     spin: SpinName = "steady"
@@ -109,9 +111,10 @@ class Scenario(Settings):
         if self.things_seed is not None and self.scene not in _FURNISHED:
             msg = f"things_seed: only {', '.join(_FURNISHED)} can be furnished in another way"
             raise ValueError(msg)
-        if self.boxes and self.flight not in ("tour", "stand"):
-            msg = f"boxes: none are seen from a {self.flight}; they stand on the ground of a tour"
-            raise ValueError(msg)
+        for name in ("boxes", "spheres"):
+            if getattr(self, name) and self.flight not in ("tour", "stand"):
+                msg = f"{name}: none are seen from a {self.flight}; they stand on the ground of a tour"
+                raise ValueError(msg)
         return self
 
     @model_validator(mode="after")
@@ -162,7 +165,7 @@ class Scenario(Settings):
 
     def rng(self, purpose: str) -> np.random.Generator:
         """Random numbers that depend on the seed and on what they are for."""
-        of_world = purpose in ("scene", "place", "boxes") or self.flight_seed is None
+        of_world = purpose in ("scene", "place", "boxes", "spheres") or self.flight_seed is None
         seed = self.seed if of_world else self.flight_seed
         if purpose == "things":
             seed = self.things_seed

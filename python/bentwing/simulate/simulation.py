@@ -17,6 +17,7 @@ from bentwing.simulate.ranging import Airframe, Body, Ranger
 from bentwing.simulate.realism.draw import Realism
 from bentwing.simulate.scenes import SCENES, World
 from bentwing.simulate.scenes.boxes import with_boxes
+from bentwing.simulate.scenes.spheres import with_spheres
 from bentwing.simulate.setup import Setup
 from bentwing.simulate.stream import Sensors
 from bentwing.simulate.write import SimulatedRecording, write_recording
@@ -72,6 +73,8 @@ def _site(scenario: Scenario) -> Site:
     if scenario.boxes:
         spots = scenario.rng("where boxes stand")
         site = with_boxes(site, scenario.boxes, scenario.rng("boxes"), spots)
+    if scenario.spheres:
+        site = with_spheres(site, scenario.spheres, scenario.rng("spheres"))
     return site if scenario.speed is None else replace(site, speed=scenario.speed)
 
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from bentwing.base.atomic import write_text
 from bentwing.base.errors import UsageError
 from bentwing.base.staged_folder import staged_folder
 from bentwing.simulate.imu import RATE_HZ
@@ -18,6 +19,7 @@ from bentwing.simulate.records import (
     ScanRecord,
 )
 from bentwing.simulate.ros import BagWriter
+from bentwing.simulate.scenes.spheres import control_points
 from bentwing.simulate.stream import ticks
 from bentwing.simulate.truth import (
     ENCODER_TOPIC,
@@ -83,6 +85,9 @@ def _write(
     write_ply(files.scene, setup.world.site.mesh)
     if setup.sensors.receiver is not None:
         write_yaml(out / "truth_georeference.yaml", setup.sensors.receiver.place.truth())
+    spheres = setup.world.site.spheres
+    if spheres:
+        write_text(out / "truth_spheres.csv", control_points(spheres))
     biases = [setup.sensors.imu.biases_at(setup.first)]
     with BagWriter(files.recording, scenario.format) as bag, files.trajectory.open("w") as truth:
         for start, end, records in setup.sensors.stream(setup.first, setup.last):

@@ -60,11 +60,5 @@ def test_of_a_short_path_ten_metres_are_the_whole():
     assert found.vertical_per_10m == found.vertical
 
 
-def test_the_sentence_has_figures_with_units():
-    sentence = expected_accuracy(estimated(40.0), 0.01).sentence()
-    assert "30 mm horizontally, 10 mm vertically and 0.11° in heading" in sentence
-    assert "68 %" in sentence
-
-
 def test_without_covariances_nothing_is_expected():
     assert expected_accuracy(replace(estimated(4.0), covariances=None), 0.01) is None

@@ -45,7 +45,12 @@ def merge(tmp_path, monkeypatch):
             "settled": lambda settings, _: settings,
             "budget_of": lambda *_: SimpleNamespace(rate=rate),
             "find_groups": lambda *_: (list(groups), found),
-            "describe_map": lambda _, group, __: {"runs": list(group), "n_links": 1, "graph": {}},
+            "describe_map": lambda _, group, __: {
+                "runs": list(group),
+                "n_links": 1,
+                "joins": [],
+                "graph": {},
+            },
             "make_map": make_map,
         }
         for name, fake in fakes.items():

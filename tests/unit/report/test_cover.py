@@ -99,7 +99,7 @@ def test_what_was_left_out_is_counted_with_its_share():
     assert "1,000 (10.0 %) without an echo" in said
     assert "4 (below 0.1 %) on things that moved" in said
     assert "3 of 300 GNSS fixes that do not agree with the others" in said
-    assert "control points without a flat surface around them: M3" in said
+    assert "control points of which no flat surface or sphere was found: M3" in said
 
 
 def test_the_page_has_plan_numbers_accuracy_and_marks(page):

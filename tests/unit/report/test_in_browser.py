@@ -97,6 +97,9 @@ def report(tmp_path_factory):
         },
         trajectory=Trajectory(times, way, np.tile([0.0, 0.0, 0.0, 1.0], (300, 1))),
         map_sample=(points, np.linspace(0, 30, 60_000)),
+        map_values=np.column_stack([0.01 * points[:, 0], points[:, 1], 0.3 * points[:, 2]]).astype(
+            np.float32
+        ),
     )
     return path
 
@@ -148,7 +151,10 @@ def test_the_view_turns_zooms_and_changes_colour(opened, report):
     acts = (
         turn,
         lambda: page.mouse.wheel(0, -300),
-        page.locator("#scene button[value=time]").click,
+        *(
+            page.locator(f"#scene button[value={name}]").click
+            for name in ("time", "sigma", "intensity", "incidence")
+        ),
         page.locator("#scene button[value=top]").click,
         page.locator("#scene button[value=side]").click,
         lambda: cut.fill("1.5"),
@@ -161,6 +167,17 @@ def test_the_view_turns_zooms_and_changes_colour(opened, report):
     assert len(set(seen)) == len(seen)
     assert page.trouble == []
     assert all(url.startswith("file:") for url in page.asked)
+
+
+def test_the_legend_says_what_the_colours_are(opened):
+    for name, words in (("sigma", "mm"), ("incidence", "°"), ("height", "height, m")):
+        button = opened.locator(f"#scene button[value={name}]")
+        drawn(opened, button.click)
+        legend = opened.locator("#scene .legend").inner_text()
+        assert words in legend
+        assert len(re.findall(r"\d", legend)) >= 2
+        assert button.get_attribute("aria-pressed") == "true"
+        assert opened.locator("#scene button[aria-pressed=true]").count() == 1
 
 
 def test_nothing_overflows_and_nothing_lies_on_anything_else(opened):
@@ -181,6 +198,36 @@ def test_the_page_scrolls_past_the_view_until_that_is_clicked(opened):
     here = opened.evaluate("scrollY")
     drawn(opened, lambda: opened.mouse.wheel(0, -120))
     assert opened.evaluate("scrollY") == here
+
+
+def test_two_fingers_zoom_and_one_turns(opened):
+    canvas, cdp = opened.locator("#scene canvas"), opened.context.new_cdp_session(opened)
+    canvas.click()
+    box = canvas.bounding_box()
+    middle = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+    def touch(kind, *gaps):
+        points = [{"x": middle[0] + gap, "y": middle[1], "id": i} for i, gap in enumerate(gaps)]
+        cdp.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+    def pinch():
+        touch("touchStart", -40, 40)
+        touch("touchMove", -90, 90)
+        touch("touchEnd")
+
+    def turn():
+        touch("touchStart", 0)
+        touch("touchMove", 70)
+        touch("touchEnd")
+
+    def metres():
+        bar = opened.locator("#scene [data-part=bar]").bounding_box()["width"]
+        return float(opened.locator("#scene [data-part=length]").inner_text().split()[0]) / bar
+
+    before, first = metres(), picture(opened)
+    zoomed = drawn(opened, pinch)
+    assert metres() == pytest.approx(before * 40 / 90, rel=0.1)
+    assert drawn(opened, turn) != zoomed != first
 
 
 def test_the_map_fits_and_distances_are_those_of_the_scale_bar(opened):

@@ -41,8 +41,32 @@ def test_points_and_path_are_kept_to_a_step():
     assert nearest.max() <= 0.51 * step
     way = origin + step * decoded(data["path"], "<u2").reshape(-1, 3)
     assert np.abs(way - path().positions).max() <= 0.51 * step
-    ages = decoded(data["times"], np.uint8)
-    assert (ages[0], ages[-1]) == (0, 255)
+    height, time = data["colours"]
+    assert "codes" not in height
+    ages = decoded(time["codes"], np.uint8)
+    assert (ages[0], ages[-1]) == (0, 254)
+
+
+def test_points_are_coloured_by_what_is_known_of_them():
+    rng = np.random.default_rng(3)
+    points = rng.uniform(0, 4, (5000, 3))
+    sigma = np.where(points[:, 0] < 2.0, np.nan, 0.001 * points[:, 1]).astype(np.float32)
+    angle = np.radians(90 * points[:, 2] / 4).astype(np.float32)
+    values = np.column_stack([sigma, np.full(5000, 7.0, np.float32), angle])
+    data = data_of(scene(points, np.linspace(0, 4, 5000), path(), values=values))
+    found = {one["name"]: one for one in data["colours"]}
+    # An intensity that is the same everywhere is no colour.
+    assert list(found) == ["height", "time", "sigma", "incidence"]
+    shown = data["origin"] + data["step"] * decoded(data["points"], "<u2").reshape(-1, 3)
+    for name, expected in (("sigma", shown[:, 1]), ("incidence", 90 * shown[:, 2] / 4)):
+        one = found[name]
+        codes = decoded(one["codes"], np.uint8)
+        low, high = one["range"]
+        known = codes < 255
+        assert np.array_equal(known, shown[:, 0] >= 2.0) if name == "sigma" else known.all()
+        told = low + (high - low) * codes[known] / 254
+        off = np.abs(told - np.clip(expected[known], low, high))
+        assert off.max() < 0.6 * (high - low) / 254 + 0.01 * high
 
 
 def test_the_path_is_marked_where_a_direction_was_unseen():

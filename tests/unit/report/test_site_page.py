@@ -70,6 +70,22 @@ def test_separate_maps_are_named(page, groups, says):
     assert says in page([recording("a"), recording("b")], groups)
 
 
+def test_a_map_says_what_the_positions_of_its_runs_rest_on(page):
+    joins = [
+        {"runs": ["a", "b"], "n_places": 4, "has_loop": True},
+        {"runs": ["b", "<c>"], "n_places": 1, "has_loop": False},
+    ]
+    reason = "a single place joins <c> and b, and nothing confirms it"
+    one = {**group("a", "b", "<c>", state="doubtful"), "reason": reason, "joins": joins}
+    text = page([recording("a"), recording("b"), recording("c")], [one])
+    weak = "&lt;c&gt; and b: a single place; no other place and no loop of recordings confirms it"
+    strong = "b and a: 4 places, confirmed by a loop of recordings"
+    assert text.index(weak) < text.index(strong)
+    box = text[text.index('class="verdict warn"') : text.index("</ul>")]
+    assert "the map is to be checked" in box
+    assert "a, b, &lt;c&gt; (doubtful): a single place joins" in box
+
+
 def test_a_merging_that_failed_is_named(page):
     text = page([recording("a"), recording("b")], [group("a"), group("b")], "the <disk> is full")
     assert "The runs were not merged: the &lt;disk&gt; is full" in text

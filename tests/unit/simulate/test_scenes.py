@@ -9,6 +9,7 @@ from bentwing.simulate.scenario import Scenario
 from bentwing.simulate.scenes import SCENES, World
 from bentwing.simulate.scenes.mesh import ball, box, column, gable
 from bentwing.simulate.scenes.parts import car, facade, table
+from bentwing.simulate.scenes.spheres import RADIUS
 from bentwing.simulate.simulation import prepare
 
 # Walls and dam are flown along a line.
@@ -122,6 +123,26 @@ def test_boxes_stand_free_on_the_ground_and_elsewhere_in_another_flight(scene):
     world = Scene(empty.vertices, empty.triangles)
     tops = [box[box[:, 2] > box[:, 2].mean()] for box in np.concatenate(boxes)]
     assert abs(world.distance(np.concatenate(tops))[0]).min() > 0.05
+
+
+def test_spheres_stand_free_and_are_the_same_in_another_flight():
+    one, other = (
+        prepare(
+            Scenario(scene="office", seed=3, duration=25.0, spheres=4, flight_seed=number)
+        ).world
+        for number in (7, 8)
+    )
+    assert one.site.spheres == other.site.spheres
+    empty = grounded("office", flight_seed=7)
+    centres = np.array(one.site.spheres)
+    assert abs(Scene(empty.vertices, empty.triangles).distance(centres)[0]).min() > 2 * RADIUS
+    # Rays from all sides meet each sphere at its radius; from below, its post.
+    units = np.random.default_rng(0).normal(size=(200, 3))
+    units[:, 2] = abs(units[:, 2])
+    units /= np.linalg.norm(units, axis=1)[:, None]
+    for centre in centres:
+        ranges, _ = one.scene.cast(centre + 1.9 * RADIUS * units, -units, 10.0)
+        np.testing.assert_allclose(1.9 * RADIUS - ranges, RADIUS, atol=1e-3)
 
 
 def test_boxes_leave_the_way_of_a_car_park_free():

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from bentwing.closing.georeference.control_points import Use
+    from bentwing.closing.georeference.control_points import Kind, Use
 
 RADIUS = 0.3
 """m, where a file names none: what is flat around a mark on a floor or a wall."""
@@ -34,6 +34,7 @@ _NAMES = {
     "latitude": ("latitude", "lat"),
     "radius": ("radius", "r"),
     "use": ("use", "type"),
+    "kind": ("kind", "target", "art"),
     **{name: (name,) for name in ("map_x", "map_y", "map_z", "sigma", "time", "until", "foot_x", "foot_y", "foot_z")},
 }  # fmt: skip
 _MOST_BYTES = 2**24  # a site has some hundred marks
@@ -42,6 +43,12 @@ _PLACES = {"degrees": ("longitude", "latitude", "z"), "metres": ("x", "y", "z")}
 _PICKED = ("map_x", "map_y", "map_z")
 _FOOT = ("foot_x", "foot_y", "foot_z")
 _USES = ("control", "check")
+_KINDS: dict[str, Kind] = {
+    "": "surface",
+    "surface": "surface",
+    "sphere": "sphere",
+    "kugel": "sphere",
+}
 _UNIT = re.compile(r"\s*[\[(].*[\])]\s*$")
 
 
@@ -93,7 +100,7 @@ def _control_points(path: Path, reader: csv.DictReader[str], delimiter: str) -> 
         found = ", ".join(reader.fieldnames or []) or "nothing"
         msg = (
             f"{path}: has no column {', '.join(missing)}; its first line is {found!r}, and must name "
-            "id, x, y, z (or longitude, latitude, z), and may name radius, use, map_x, map_y, map_z, sigma, "
+            "id, x, y, z (or longitude, latitude, z), and may name radius, use, kind, map_x, map_y, map_z, sigma, "
             "time, until, foot_x, foot_y, foot_z"
         )
         raise InputError(msg)
@@ -174,8 +181,16 @@ def _control_point(
             "control or check"
         )
         raise InputError(msg)
-    kind: Use = "check" if use == "check" else "control"
-    return ControlPoint(name, position, radius, kind, picked, sigma, standing)
+    used: Use = "check" if use == "check" else "control"
+    kind = _KINDS.get(row.text("kind").lower())
+    if kind is None or (kind == "sphere" and row.value("radius") is None):
+        what = "a sphere without a radius" if kind else f"of the kind {row.text('kind')!r}"
+        msg = (
+            f"{path}: point {name!r} is {what}; the kind is surface or sphere, and a sphere has its radius "
+            "in metres"
+        )
+        raise InputError(msg)
+    return ControlPoint(name, position, radius, used, picked, sigma, standing, kind)
 
 
 def _standing(row: _Row) -> Standing | None:

@@ -29,6 +29,7 @@ _TRIMMED = 3.0
 
 
 Use: TypeAlias = Literal["control", "check"]
+Kind: TypeAlias = Literal["surface", "sphere"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,11 +56,12 @@ class ControlPoint:
     name : of the mark
     position : (3,) m, easting, northing, height in the map's system; of a file in degrees longitude,
         latitude, height
-    radius : m, of the surface around it that is flat
+    radius : m, of the surface around it that is flat, or of the sphere
     use : `control` points constrain the map, `check` points only tell how good it is
     picked : (3,) m, where the mark was seen in the map; None where nobody has said
     sigma : m, standard deviation of that place
     standing : when the carrier stood on the mark, which says where it is in the map
+    kind : `surface` for a mark on one, `sphere` for the centre of a sphere
     """
 
     name: str
@@ -69,6 +71,7 @@ class ControlPoint:
     picked: Array | None = None
     sigma: float = PICKED
     standing: Standing | None = None
+    kind: Kind = "surface"
 
 
 @dataclass(frozen=True, slots=True)

@@ -119,9 +119,9 @@ def georeference(
         targets = site.targets_of(listed)
         marks = Marks.collect(listed.points, targets, placement, slack, chunks())
         marks.measure(placement, slack)
-        if not len(site.positions.points) and not any(marks.planes):
+        if not len(site.positions.points) and not any(marks.found):
             msg = (
-                f"the map has no flat surface within {slack:.1f} m of any control point: without GNSS it is "
+                f"the map has no flat surface and no sphere within {slack:.1f} m of any control point: without GNSS it is "
                 "in a frame of its own, and two or more marks whose places in the map the file gives "
                 "as map_x, map_y, map_z say where that is"
             )
@@ -230,7 +230,7 @@ def _other_heights(site: Site, marks: Marks) -> list[str]:
     if not len(site.times):
         return []
     gap = float(np.median(marks.targets[:, 2]) - np.median(site.positions.targets[:, 2]))
-    if abs(gap) < _GEOID or any(marks.planes):
+    if abs(gap) < _GEOID or any(marks.found):
         return []
     where = "above" if gap > 0 else "below"
     return [

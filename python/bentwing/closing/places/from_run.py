@@ -56,14 +56,14 @@ class RunMap:
         InputError
             If the map cannot be read.
         """
-        from bentwing.map.read_las import las_column  # laspy is slow to import
+        from bentwing.map.read_las import las_columns  # laspy is slow to import
 
-        runs = las_column(self.path, "run_id") if len(self._origins) > 1 else iter(())
+        runs = las_columns(self.path, {"run_id": 0}) if len(self._origins) > 1 else iter(())
         for part in read_parts(self.path, self.georeference):
             if part.times is None:
                 yield part.points, None
             else:
-                yield part.points, part.times - self._origins[next(runs, 0)]
+                yield part.points, part.times - self._origins[next(runs, [0])[0]]
 
 
 def map_of_run(folder: Path) -> RunMap:

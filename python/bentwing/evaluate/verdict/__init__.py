@@ -3,7 +3,12 @@
 
 from __future__ import annotations
 
-from bentwing.evaluate.verdict.closing import judge_closing, judge_marks, judge_revisits
+from bentwing.evaluate.verdict.closing import (
+    judge_closing,
+    judge_joins,
+    judge_marks,
+    judge_revisits,
+)
 from bentwing.evaluate.verdict.early import EarlyJudge
 from bentwing.evaluate.verdict.evidence import Evidence
 from bentwing.evaluate.verdict.judge import judge_estimate, judge_so_far
@@ -22,6 +27,7 @@ __all__ = [
     "judge_breaks",
     "judge_closing",
     "judge_estimate",
+    "judge_joins",
     "judge_marks",
     "judge_revisits",
     "judge_so_far",

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 _SHORTEST = 15.0
 # A pair of visits as far apart as this, m, is no surprise whatever the sensor.
 _OFFSET = 0.01
+_NAMED = 3  # pairs of runs, of many
 _FEWEST = 50  # patches that were visited twice
 
 
@@ -71,6 +72,20 @@ def judge_marks(georeference: Mapping[str, Any] | None) -> list[Evidence]:
         facts = {"names": names, "metres": one["off"], "unused": unused}
         found.append(Evidence("marks", 1.0, (), facts))
     return found
+
+
+def judge_joins(pairs: Sequence[tuple[str, str]]) -> list[Evidence]:
+    """Judge by runs that a single place joins.
+
+    Parameters
+    ----------
+    pairs : names of two runs each, whose relative pose rests on one place that nothing confirms
+    """
+    if not pairs:
+        return []
+    named = "; ".join(f"{b} and {a}" for a, b in pairs[:_NAMED])
+    more = f"; and {len(pairs) - _NAMED} more pairs" if len(pairs) > _NAMED else ""
+    return [Evidence("joins", float(len(pairs)), (), {"runs": f"{named}{more}"})]
 
 
 def _usual_drift(estimate: Estimate) -> float:

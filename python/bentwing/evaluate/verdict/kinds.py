@@ -184,6 +184,11 @@ KINDS: dict[str, Kind] = {
         "{names} lies {metres:.2f} m from where the other surveyed marks put it{unused}",
         "check its coordinates, and where it was seen in the map",
     ),
+    "joins": Kind(
+        11, 0.5, _NEVER,
+        "a single place joins {runs}, and no second place, no loop of runs and no fixes confirm it",
+        "check the map there, or add a run that sees both at another place",
+    ),
     "speed": Kind(
         12, 40.0, 80.0,
         "the trajectory reaches {value:.0f} m/s at {at:.1f} s",

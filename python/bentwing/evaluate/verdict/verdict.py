@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
 from bentwing.evaluate.verdict.kinds import KINDS, LAST_CAUSE
@@ -32,6 +32,7 @@ class Reason:
     advice : what to do
     value, bound : the measure, and what it stays below in a good result
     spans : when, s; empty where it is the whole time
+    facts : what the sentence says beside the value, for other languages
     """
 
     kind: str
@@ -41,6 +42,7 @@ class Reason:
     value: float
     bound: float
     spans: tuple[Span, ...] = ()
+    facts: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,6 +87,7 @@ class Verdict:
                     "value": reason.value,
                     "bound": reason.bound,
                     "spans": [list(span) for span in reason.spans],
+                    "facts": dict(reason.facts),
                 }
                 for reason in self.reasons
             ],
@@ -103,6 +106,7 @@ class Verdict:
                 float("inf") if one["value"] is None else one["value"],
                 one["bound"],
                 tuple((first, last) for first, last in one["spans"]),
+                dict(one.get("facts") or {}),
             )
             for one in described["reasons"]
         ]
@@ -141,6 +145,7 @@ def _reason(evidence: Evidence) -> Reason | None:
         value,
         kind.doubtful,
         evidence.spans,
+        evidence.facts,
     )
 
 

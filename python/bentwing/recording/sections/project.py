@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 from zoneinfo import ZoneInfo
 
 from pydantic import ConfigDict, Field, ValidationError, field_validator
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
 _KEY = "project"
-_ADVICE = "give a YAML file with name, number, site, client, contractor, operator, instrument, time_zone or remarks"
+_ADVICE = "give a YAML file with name, number, site, client, contractor, operator, instrument, time_zone, language or remarks"
 
 Words = Annotated[str, Field(max_length=200)]
 
@@ -35,6 +35,7 @@ class Project(Section):
     operator : who recorded it
     instrument : the sensor head with its serial number; default: the name in payload.yaml
     time_zone : in which times are told, such as Europe/Berlin
+    language : of the report, `en` or `de`
     remarks : anything else in a sentence or two
     """
 
@@ -49,6 +50,7 @@ class Project(Section):
     operator: Words = ""
     instrument: Words = ""
     time_zone: Words = "UTC"
+    language: Literal["en", "de"] = "en"
     remarks: Annotated[str, Field(max_length=1000)] = ""
 
     @field_validator("*")

@@ -11,11 +11,12 @@ from bentwing.base.trajectory import DT
 from bentwing.closing.global_registration import Recorded, register_jointly
 from bentwing.closing.global_registration.stretches import Stretches
 from bentwing.closing.joining.matches import Match, Part
-from bentwing.evaluate.verdict import judge_closing, judge_marks, judge_revisits
+from bentwing.evaluate.verdict import judge_closing, judge_joins, judge_marks, judge_revisits
 from bentwing.odometry.segments import joined
 from bentwing.run.folder import RunFolder
 from bentwing.run.found import Found
 from bentwing.run.mapping import joined_trajectory, write_map
+from bentwing.run.merging.joins import joins_of
 from bentwing.run.merging.on_earth import place_on_earth
 from bentwing.run.merging.trajectories import write_trajectories
 from bentwing.run.report import report_run, say_warnings
@@ -28,7 +29,9 @@ if TYPE_CHECKING:
     from bentwing.base.progress import Progress
     from bentwing.closing.joining.placing import Placed
     from bentwing.closing.joining.survey import Survey
-    from bentwing.evaluate.verdict import Verdict
+    from bentwing.evaluate.verdict import Evidence, Verdict
+    from bentwing.run.merging.joins import Join
+    from bentwing.run.merging.on_earth import OnEarth
     from bentwing.run.merging.source import Source
     from bentwing.run.settings import MergeSettings
 
@@ -93,6 +96,7 @@ def describe_map(where: str, group: Placed, found: Ingredients) -> dict[str, Any
         "folder": where,
         "runs": [found.sources[run].name for run in _numbers(group)],
         "n_links": len(links),
+        "joins": [one.described([s.name for s in found.sources]) for one in _joins(group, found)],
         "graph": group.record,
     }
 
@@ -102,19 +106,27 @@ def _numbers(group: Placed) -> list[int]:
 
 
 def _warnings(group: Placed, found: Ingredients) -> list[str]:
-    """Return those of the runs in a group, and where a run hangs by one place only."""
-    sources, runs = found.sources, _numbers(group)
-    told = [warning for run in runs for warning in sources[run].told]
-    believed = [m for m in found.matches if m.believed and m.a.run != m.b.run]
-    for run in runs:
-        links = [m for m in believed if run in {m.a.run, m.b.run}]
-        if len(links) == 1:
-            other = ({links[0].a.run, links[0].b.run} - {run}).pop()
-            told.append(
-                f"{sources[run].name} is joined by a single place, with {sources[other].name}: "
-                "check the map there"
-            )
-    return told
+    """Return those of the runs in a group."""
+    return [warning for run in _numbers(group) for warning in found.sources[run].told]
+
+
+def _joins(group: Placed, found: Ingredients) -> list[Join]:
+    members = _numbers(group)
+    links = [m for m in found.matches if m.believed and {m.a.run, m.b.run} <= {*members}]
+    return joins_of((m.a.run, m.b.run) for m in links)
+
+
+def _judged(group: Placed, found: Ingredients, fixed: Collection[str]) -> list[Evidence]:
+    """Judge by what the positions of the runs rest on, where fixes do not say them."""
+    names = [source.name for source in found.sources]
+    pairs = [(names[one.a], names[one.b]) for one in _joins(group, found) if not one.is_confirmed]
+    return judge_joins([pair for pair in pairs if not fixed.issuperset(pair)])
+
+
+def _with_fixes(on_earth: OnEarth) -> set[str]:
+    """Return the names of the runs whose own fixes agree with where they are."""
+    fixes = {} if on_earth.placed is None else on_earth.placed.record.get("fixes") or {}
+    return {one["name"] for one in fixes.get("runs") or [] if one["used"] and not one["disagrees"]}
 
 
 def make_map(
@@ -221,6 +233,7 @@ def _one_map(
         stage_warnings=tuple(notes),
         evidence=(
             *judge_closing(closing, placed),
+            *_judged(group, found, _with_fixes(on_earth)),
             *judge_revisits(written.revisits, sigma),
             *(judge_marks(on_earth.placed.record) if on_earth.placed else ()),
         ),

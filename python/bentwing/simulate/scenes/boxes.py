@@ -15,8 +15,6 @@ from bentwing.simulate.scenes.world import Site, World
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from bentwing.simulate.scenes.mesh import Mesh
-
     Array = NDArray[np.float64]
 
 _SMALLEST, _LARGEST = (0.5, 0.4, 0.5), (1.3, 0.9, 1.7)
@@ -44,16 +42,20 @@ def with_boxes(site: Site, n: int, sizes: np.random.Generator, spots: np.random.
         If there is no room for them.
     """
     for size in sizes.uniform(_SMALLEST, _LARGEST, (n, 3)):
-        placed = _standing(site, size, spots)
-        if placed is None:
+        spot = free_spot(site, size, spots)
+        if spot is None:
             msg = f"no room for {n} boxes in this scene: ask for fewer, or try another seed"
             raise UsageError(msg)
-        site = replace(site, mesh=merge([site.mesh, placed]))
+        a, b, c = size
+        body = box((-a / 2, -b / 2, -_SUNK), (a / 2, b / 2, c))
+        site = replace(site, mesh=merge([site.mesh, body.moved(*spot)]))
     return site
 
 
-def _standing(site: Site, size: Array, rng: np.random.Generator) -> Mesh | None:
-    """Return a box where there is room for it; None if none was found."""
+def free_spot(
+    site: Site, size: Array, rng: np.random.Generator
+) -> tuple[tuple[float, float, float], float] | None:
+    """Return place and yaw on the ground where there is room for a box; None if none was found."""
     world, radius = World(site), float(np.hypot(*size[:2])) / 2
     xy = rng.uniform(site.low[:2], site.high[:2], (_TRIES, 2))
     yaws = rng.uniform(0.0, np.pi, _TRIES)
@@ -71,9 +73,8 @@ def _standing(site: Site, size: Array, rng: np.random.Generator) -> Mesh | None:
     chosen = np.flatnonzero(free)
     if not len(chosen):
         return None
-    k, (a, b, c) = chosen[0], size
-    body = box((-a / 2, -b / 2, -_SUNK), (a / 2, b / 2, c))
-    return body.moved((*xy[k], heights[k]), yaws[k])
+    k = chosen[0]
+    return (float(xy[k, 0]), float(xy[k, 1]), float(heights[k])), float(yaws[k])
 
 
 def _from_route(site: Site, xy: Array) -> Array:

@@ -47,6 +47,7 @@ class Site:
     survey : the line to fly instead of a tour through the box, where there is one
     route : corners of a closed way, m, that a tour follows here instead of choosing its own
     road : points on the ground, m, along which a car drives
+    spheres : centres, m, of those that stand as control marks
     """
 
     mesh: Mesh
@@ -57,6 +58,7 @@ class Site:
     survey: Survey | None = None
     route: tuple[Point, ...] = ()
     road: tuple[Point, ...] = ()
+    spheres: tuple[Point, ...] = ()
 
 
 class World:

@@ -55,6 +55,11 @@ class RecordedFolder:
             return None
         return record if isinstance(record, dict) and record.get("kind") == self.kind else None
 
+    def write(self, path: Path, record: Mapping[str, Any]) -> None:
+        """Write the record in a folder, atomically."""
+        text = json.dumps(plain(record), indent=1, allow_nan=False)
+        write_text(path / self.record, text + "\n")
+
     def claim(self, path: Path, inputs: Iterable[Path] = ()) -> tuple[FolderLock, list[str]]:
         """Make the folder ours: return its lock and the names of the files of what was there.
 
@@ -208,8 +213,7 @@ class ResultFolder:
         return {"kind": self._of.kind, "complete": False, "files": sorted(self._files)}
 
     def _write(self, record: dict[str, Any]) -> None:
-        text = json.dumps(plain(record), indent=1, allow_nan=False)
-        write_text(self.path / self._of.record, text + "\n")
+        self._of.write(self.path, record)
 
 
 def reason_of(error: BaseException) -> str:

@@ -73,6 +73,7 @@ def say_site(site: Site, *, quiet: bool) -> None:
     """
     from bentwing.fleet.task import sentence_of
 
+    page = site.place(site.out / "index.html")
     if not quiet:
         wide = max(len(one.name) for one in site.recordings)
         for one in site.recordings:
@@ -81,8 +82,8 @@ def say_site(site: Site, *, quiet: bool) -> None:
         for group in site.groups or []:
             alone = len(group.runs) == 1
             state = "belongs to no other" if alone else sentence_of(group.state, group.reason)
-            typer.echo(f"{group.folder}: {', '.join(group.runs)}; {state}")
-        typer.echo(f"{site.out}: {_counted(site)}; open {site.out / 'index.html'}")
+            typer.echo(f"{site.place(group.folder)}: {', '.join(group.runs)}; {state}")
+        typer.echo(f"{site.url or site.out}: {_counted(site)}; open {page}")
     if site.is_complete:
         return
     bad = [one for one in site.recordings if not one.is_usable]
@@ -97,9 +98,9 @@ def say_site(site: Site, *, quiet: bool) -> None:
             else []
         ),
         *([f"the runs were not merged: {site.failure}"] if site.failure else []),
-        *(f"{one.folder}: {sentence_of(one.state, one.reason)}" for one in wrong),
+        *(f"{site.place(one.folder)}: {sentence_of(one.state, one.reason)}" for one in wrong),
     ]
-    msg = f"{'; '.join(problems)}; open {site.out / 'index.html'}"
+    msg = f"{'; '.join(problems)}; open {page}"
     if len(bad) < len(site.recordings):
         raise PartialError(msg)
     raise (EstimationError if any(one.state == "failed" for one in bad) else InputError)(msg)

@@ -6,26 +6,46 @@ from typing import Annotated
 
 import typer
 
+from bentwing.base.new_file import require_folder
 from bentwing.cli import options
+from bentwing.fleet.store import is_url
 
 EXAMPLES = (
     "bentwing fleet flights -o site",
     "bentwing fleet flights.yaml -o site --workers 4",
     "bentwing fleet flights.csv -o site --scheduler tcp://head:8786",
+    "bentwing fleet s3://bucket/flights -o s3://bucket/site",
 )
+
+
+def _writable(place: str) -> str:
+    """Look at a folder here before anything else is done; a store is asked when it is written to."""
+    if not is_url(place):
+        require_folder(Path(place))
+    return place
 
 
 def command(
     recordings: Annotated[
-        list[Path],
+        list[str],
         typer.Argument(
-            metavar="MANIFEST|FOLDER",
-            help="List of recordings, .yaml or .csv, or folders that hold recordings.",
+            metavar="MANIFEST|FOLDER|URL",
+            help="List of recordings, .yaml or .csv, or folders that hold recordings; also s3://….",
             rich_help_panel=options.INPUT,
         ),
     ],
     *,
-    out: options.Out,
+    out: Annotated[
+        str,
+        options.option(
+            options.RESULT,
+            "--out",
+            "-o",
+            metavar="FOLDER|URL",
+            callback=_writable,
+            help="Write into this folder, here or in a store.",
+        ),
+    ],
     payload: options.Payload = None,
     settings: options.Settings = None,
     set_: options.Set = [],  # noqa: B006 - typer reads it and hands out a copy

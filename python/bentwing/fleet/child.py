@@ -62,6 +62,7 @@ def merge_all(order: dict[str, Any], progress: Progress) -> dict[str, Any]:
             settings,
             order["made"],
             kept=Path(order["kept"]),
+            recordings={n: [Path(p) for p in paths] for n, paths in order["recordings"].items()},
             progress=progress,
         )
     except FolderBusyError as error:

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from bentwing.fleet.stored import Stored
+
 
 @dataclass(frozen=True, slots=True)
 class Entry:
@@ -17,7 +19,7 @@ class Entry:
     Attributes
     ----------
     name : of its run folder; no two are the same
-    parts : files that are one recording
+    parts : files that are one recording, here or in a store
     payload : description of the sensor head; None where nothing describes it
     project : YAML file of what the report names
     marks : CSV file of control points
@@ -25,7 +27,7 @@ class Entry:
     """
 
     name: str
-    parts: tuple[Path, ...]
+    parts: tuple[Path | Stored, ...]
     payload: Path | None = None
     project: Path | None = None
     marks: Path | None = None

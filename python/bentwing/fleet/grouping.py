@@ -23,7 +23,7 @@ from bentwing.run.request import deciding, digest_of, request_in
 from bentwing.run.run import verdict_in
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator, Mapping, Sequence
 
     from bentwing.base.progress import Progress
     from bentwing.closing.joining.placing import Placed
@@ -40,6 +40,7 @@ def merge_groups(
     made: Mapping[str, str],
     *,
     kept: Path,
+    recordings: Mapping[str, Sequence[Path]],
     progress: Progress,
 ) -> dict[str, Any]:
     """Find the groups of runs, and make the maps of those that are not there yet.
@@ -50,6 +51,7 @@ def merge_groups(
     out : folder in which each group that is made gets a folder
     made : folders of complete groups by their requests
     kept : folder of what comparing runs has found, so that it is found once
+    recordings : of the runs that do not find them where they had them, by their names
 
     Returns
     -------
@@ -60,10 +62,10 @@ def merge_groups(
     ------
     UsageError, InputError
     """
-    folders = [Path(run) for run in runs.values()]
-    sources = [
-        replace(source, name=name) for source, name in zip(open_sources(folders), runs, strict=True)
-    ]
+    folders = {name: Path(run) for name, run in runs.items()}
+    moved = {folders[name]: list(paths) for name, paths in recordings.items()}
+    opened = open_sources(list(folders.values()), moved)
+    sources = [replace(source, name=name) for source, name in zip(opened, runs, strict=True)]
     settings = settled(settings, sources)
     comparisons = Comparisons(kept)
     groups, found = find_groups(sources, settings, progress, lambda _: nullcontext(), comparisons)

@@ -5,18 +5,20 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bentwing.base.atomic import write_text
-from bentwing.base.errors import BentwingError
+from bentwing.base.errors import BentwingError, InputError
 from bentwing.base.run_record import RUN_FOLDER, finished_record
 from bentwing.fleet.folder import COMPARISONS, GROUPS, clear_staging, publish, staging_of
 from bentwing.fleet.process import Processes, run_unless_done
+from bentwing.fleet.store import is_url
+from bentwing.fleet.stored import Fetched, Stored
 from bentwing.run.request import deciding, digest_of, record_of_request
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
-    from pathlib import Path
 
     from bentwing.fleet.task import Mapped
     from bentwing.run.settings import MergeSettings
@@ -104,12 +106,23 @@ def merge_runs(
     ------
     ProcessDiedError
     """
+    try:
+        with Fetched() as fetched:
+            return _merged(task, threads, processes, fetched)
+    except InputError as error:  # of a store
+        return {"failed": str(error)}
+
+
+def _merged(
+    task: MergeTask, threads: int | None, processes: Processes | None, fetched: Fetched
+) -> dict[str, Any]:
     staging = staging_of(task.place, task.request)
     order = {
         "runs": task.runs, "settings": task.settings, "threads": threads, "out": staging,
-        "made": _made(task.place), "kept": task.kept,
+        "made": _made(task.place), "kept": task.kept, "recordings": _fetch(task.runs, fetched),
     }  # fmt: skip
     answer = run_unless_done("merge", order, "merge", processes, lambda: finished_merging(task))
+    answer = fetched.named(answer)
     if "failed" in answer or "request" in answer:
         return answer
     task.place.mkdir(exist_ok=True)
@@ -118,11 +131,25 @@ def merge_runs(
         if old.name not in named and RUN_FOLDER.read(old) is not None:
             RUN_FOLDER.remove(old)
     for made in sorted(staging.iterdir()) if staging.is_dir() else []:
+        if fetched.names:
+            RUN_FOLDER.write(made, fetched.named(RUN_FOLDER.read(made)))
         publish(made, task.place / made.name)
     clear_staging(task.place)
     answer = {**answer, "request": task.request}
     write_text(task.place / ANSWER, json.dumps(answer, indent=1))
     return answer
+
+
+def _fetch(runs: Mapping[str, Path], fetched: Fetched) -> dict[str, list[Path]]:
+    """Fetch the recordings that are in a store; return where they are by the names of their runs."""
+    found = {}
+    for name, folder in runs.items():
+        where = (RUN_FOLDER.read(folder) or {}).get("recordings") or []
+        if any(map(is_url, where)):
+            found[name] = [
+                fetched.path(Stored.at(one) if is_url(one) else Path(one)) for one in where
+            ]
+    return found
 
 
 def finished_merging(task: MergeTask) -> dict[str, Any] | None:

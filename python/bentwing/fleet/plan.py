@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from bentwing.base.errors import BentwingError
 from bentwing.fleet.memory import megabytes_of
+from bentwing.fleet.stored import Carried, Stored
 from bentwing.fleet.task import Mapped, MapTask
 from bentwing.recording.sections.project import Project
 from bentwing.run.choose import choose, given, merged
@@ -101,19 +102,25 @@ def _task_of(
 
 def _described(entry: Entry, runs: Path, choice: Choice) -> tuple[MapTask, tuple[Any, ...]]:
     """Return what is to be done, and what tells the recording from others."""
-    for part in entry.parts:
-        part.stat()  # the system says what is wrong with it
     settings = choice.settings(entry)
     # Whoever does the work may do it in another folder.
-    recordings = tuple(part.absolute() for part in entry.parts)
+    recordings = tuple(p if isinstance(p, Stored) else p.absolute() for p in entry.parts)
+    read = [one for part in recordings for one in _inputs_of(part)]
     known = entry.payload or choice.payload
     payload = None if known is None else known.absolute()
-    inputs = inputs_of([*recordings, *([payload] if payload else [])])
-    read = inputs[:-1] if payload else inputs
-    request = request_of(settings, inputs)
+    request = request_of(settings, [*read, *inputs_of([payload] if payload else [])])
     size = sum(one["bytes"] for one in read)
+    is_stored = any(isinstance(part, Stored) for part in recordings)
     task = MapTask(
-        entry.name, runs / entry.name, recordings, payload, settings.to_yaml(), request,
-        megabytes_of(size, settings.closing),
+        entry.name, runs / entry.name, recordings,
+        Carried.of(payload) if payload and is_stored else payload,
+        settings.to_yaml(), request, megabytes_of(size, settings.closing),
     )  # fmt: skip
-    return task, (*sorted(one["sha256"] for one in read), settings.start)
+    return task, (*sorted(one.get("sha256") or one["tag"] for one in read), settings.start)
+
+
+def _inputs_of(part: Path | Stored) -> list[dict[str, Any]]:
+    if isinstance(part, Stored):
+        return part.inputs()
+    part.stat()  # the system says what is wrong with it
+    return inputs_of([part])

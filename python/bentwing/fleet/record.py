@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bentwing.base.regular_file import resolved
@@ -13,7 +14,6 @@ from bentwing.fleet.task import Mapped
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-    from pathlib import Path
 
     from bentwing.fleet.groups import Group
 
@@ -30,6 +30,7 @@ class Site:
     failure : why there are no merged maps, empty where there are
     places : what the merging compared, as in run.json
     merging : settings of the merging that were given
+    url : of a site in a store; then `out` is '.', and all folders are relative to this
     """
 
     out: Path
@@ -38,6 +39,24 @@ class Site:
     failure: str = ""
     places: Mapping[str, Any] | None = None
     merging: Mapping[str, Any] | None = None
+    url: str | None = None
+
+    def place(self, path: Path) -> str:
+        """Return where something of the site is, as users name it."""
+        return str(path) if self.url is None else f"{self.url}/{path.as_posix()}"
+
+    def in_store(self, url: str) -> Site:
+        """Return the site whose copy this is."""
+
+        def moved(folder: Path) -> Path:
+            return folder.relative_to(self.out)
+
+        mapped = [
+            one if one.folder is None else replace(one, folder=moved(one.folder))
+            for one in self.recordings
+        ]
+        groups = self.groups and [replace(one, folder=moved(one.folder)) for one in self.groups]
+        return replace(self, out=Path(), recordings=mapped, groups=groups, url=url)
 
     @property
     def is_complete(self) -> bool:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,10 +15,14 @@ from bentwing.fleet.discover import find_recordings
 from bentwing.fleet.folder import RECORDINGS, SITE_FOLDER
 from bentwing.fleet.joining import complete, merged_site
 from bentwing.fleet.manifest import MANIFEST_SUFFIXES, read_manifest
+from bentwing.fleet.mirror import Mirror
 from bentwing.fleet.opened import LazyPool, on_cluster
 from bentwing.fleet.plan import Choice, plan
 from bentwing.fleet.pool import Job
 from bentwing.fleet.record import Site
+from bentwing.fleet.scratch import scratch_folder
+from bentwing.fleet.skeleton import Skeleton
+from bentwing.fleet.store import is_url
 from bentwing.fleet.task import Mapped, finished, map_recording_of, sentence_of
 from bentwing.recording.ready import payload_path
 from bentwing.run.settings import merge_settings
@@ -55,8 +60,8 @@ def map_fleet(
 
     Parameters
     ----------
-    recordings : a manifest, or folders of recordings
-    out : folder of the result
+    recordings : a manifest, or folders of recordings; also in a store, by URL
+    out : folder of the result, or a URL
     payload : description of the head of recordings that have none of their own
     settings : YAML file of what `bentwing map --print-settings` prints, all or some of it
     estimator, map_format, map_spacing : as `map_recording` takes them
@@ -76,7 +81,7 @@ def map_fleet(
     options = given(
         estimator=estimator, map_format=map_format, map_spacing=map_spacing, threads=threads
     )
-    given_paths = [recordings] if isinstance(recordings, (str, Path)) else list(recordings)
+    paths = [recordings] if isinstance(recordings, (str, Path)) else list(recordings)
     choice = Choice(
         None if settings is None else Path(settings),
         (),
@@ -85,12 +90,12 @@ def map_fleet(
     )
     shown = as_progress(progress)
     opened = on_cluster(threads, shown, workers=workers, scheduler=scheduler, client=client)
-    return map_site([Path(path) for path in given_paths], Path(out), choice, opened, shown)
+    return map_site(paths, out, choice, opened, shown)
 
 
 def map_site(
-    paths: Sequence[Path],
-    out: Path,
+    paths: Sequence[Path | str],
+    out: Path | str,
     choice: Choice,
     opened: Opened,
     progress: Progress,
@@ -104,27 +109,64 @@ def map_site(
     opened : opens the pool that the work runs in, once there is some
     merges : whether the runs are merged; then they are in a sub-folder of `out`, else in `out` itself
     """
-    entries, manifests = _entries(paths)
-    choice.settings()  # what is wrong with all of them is no matter of one
+    with Skeleton() as skeleton:
+        with skeleton.named():
+            found = _Found.at(paths, skeleton)
+        choice.settings()  # what is wrong with all of them is no matter of one
+        if not is_url(out):
+            return _map_found(found, Path(out), choice, opened, progress, merges=merges)
+        with scratch_folder() as scratch:
+            mirror = Mirror(str(out), scratch / "site")
+            away = mirror.opened(opened)
+            return mirror.finish(_map_found(found, mirror.folder, choice, away, progress))
+
+
+def _map_found(
+    found: _Found,
+    out: Path,
+    choice: Choice,
+    opened: Opened,
+    progress: Progress,
+    *,
+    merges: bool = True,
+) -> Site:
     runs = out / RECORDINGS if merges else out
-    read = [*manifests, *(part for entry in entries for part in entry.parts)]
-    with ResultFolder(out, SITE_FOLDER, read) as folder, ExitStack() as stack:
+    with ResultFolder(out, SITE_FOLDER, found.files()) as folder, ExitStack() as stack:
         runs.mkdir(exist_ok=True)
-        tasks, refused = plan(entries, resolved(runs), choice)
+        tasks, refused = plan(found.entries, resolved(runs), choice)
+        refused = [replace(one, reason=found.skeleton.said(one.reason)) for one in refused]
         pool = LazyPool(opened, stack)
         mapped = {one.name: one for one in [*refused, *_map(tasks, pool, progress)]}
-        site = Site(out, [mapped[entry.name] for entry in entries])
+        site = Site(out, [mapped[entry.name] for entry in found.entries])
         if merges:
             site = merged_site(site, _merging_of(choice), pool, progress)
-        complete(folder, site, manifests)
+        complete(folder, site, found.manifests)
     return site
 
 
-def _entries(paths: Sequence[Path]) -> tuple[list[Entry], list[Path]]:
-    """Return the recordings and the manifests that list them."""
-    if len(paths) == 1 and paths[0].suffix in MANIFEST_SUFFIXES and not paths[0].is_dir():
-        return read_manifest(paths[0]), [paths[0]]
-    return find_recordings(paths), []
+@dataclass(frozen=True, slots=True)
+class _Found:
+    """Recordings, the manifests that list them, and the stores that hold them."""
+
+    entries: list[Entry]
+    manifests: list[Path]
+    skeleton: Skeleton
+
+    @classmethod
+    def at(cls, given: Sequence[Path | str], skeleton: Skeleton) -> _Found:
+        """Find the recordings that paths list or hold."""
+        paths = [skeleton.path(path) for path in given]
+        manifests: list[Path] = []
+        if len(paths) == 1 and paths[0].suffix in MANIFEST_SUFFIXES and not paths[0].is_dir():
+            entries, manifests = read_manifest(paths[0]), paths
+        else:
+            entries = find_recordings(paths)
+        return cls([skeleton.entry(entry) for entry in entries], manifests, skeleton)
+
+    def files(self) -> list[Path]:
+        """Return what is read of the file systems here."""
+        parts = [part for entry in self.entries for part in entry.parts]
+        return [*self.manifests, *(part for part in parts if isinstance(part, Path))]
 
 
 def _map(tasks: Sequence[MapTask], pool: LazyPool, progress: Progress) -> Iterator[Mapped]:

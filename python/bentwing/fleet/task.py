@@ -4,21 +4,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from bentwing.base.errors import BentwingError, UsageError
 from bentwing.base.provenance import bentwing_version
+from bentwing.base.regular_file import resolved
 from bentwing.base.run_record import RUN_FOLDER, finished_record, understood
 from bentwing.fleet.folder import publish, require_run_or_nothing, staging_of
 from bentwing.fleet.process import Processes, run_unless_done
+from bentwing.fleet.stored import Fetched
 from bentwing.run.request import record_of_request, request_in
 from bentwing.run.run import require_single, verdict_in
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-    from pathlib import Path
 
     from bentwing.evaluate.verdict import Verdict
+    from bentwing.fleet.stored import Carried, Stored
 
 State = Literal["good", "doubtful", "failed", "refused"]
 
@@ -31,7 +34,7 @@ class MapTask:
     ----------
     name : of the recording
     place : of its run folder
-    recordings : files that are one recording
+    recordings : files that are one recording, here or in a store
     payload : file that the head was read from
     settings : YAML
     request : SHA-256 of inputs, settings and version
@@ -41,8 +44,8 @@ class MapTask:
 
     name: str
     place: Path
-    recordings: tuple[Path, ...]
-    payload: Path | None
+    recordings: tuple[Path | Stored, ...]
+    payload: Path | Carried | None
     settings: str
     request: str
     megabytes: float
@@ -52,6 +55,11 @@ class MapTask:
     def key(self) -> str:
         """Name of the work, by its content."""
         return f"map-{self.name}-{self.request}"
+
+    @property
+    def where(self) -> list[str]:
+        """Where the recordings lie, as run.json has it."""
+        return [str(resolved(p) if isinstance(p, Path) else p) for p in self.recordings]
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +96,7 @@ class Mapped:
 
 def finished(task: MapTask) -> Mapped | None:
     """Return what came of a recording if its run is there, made in the same way."""
-    record = record_of_request(task.place, task.request, task.recordings)
+    record = record_of_request(task.place, task.request, task.where)
     if record is None:
         return None
     return replace(_mapped(task.name, task.place, record), is_earlier=True)
@@ -117,26 +125,33 @@ def map_recording_of(
         If it ended without an answer: it may be worth another try.
     """
     try:
-        return _made(task, threads, processes)
+        with Fetched() as fetched:
+            return _made(task, threads, processes, fetched)
     except BentwingError as error:
         return Mapped(task.name, "refused", str(error), request=task.request)
 
 
-def _made(task: MapTask, threads: int | None, processes: Processes | None) -> Mapped:
+def _made(
+    task: MapTask, threads: int | None, processes: Processes | None, fetched: Fetched
+) -> Mapped:
     if task.version != bentwing_version():
         msg = f"this worker has bentwing {bentwing_version()}, the client has {task.version}; install the same"
         raise UsageError(msg)
     require_run_or_nothing(task.place)
     staging = staging_of(task.place, task.request)
+    payload = None if task.payload is None else fetched.path(task.payload)
     order = {
-        "recordings": task.recordings, "payload": task.payload, "settings": task.settings,
-        "threads": threads, "out": staging,
+        "recordings": [fetched.path(one) for one in task.recordings], "payload": payload,
+        "settings": task.settings, "threads": threads, "out": staging,
     }  # fmt: skip
     answer = run_unless_done("map", order, task.name, processes, lambda: finished(task))
     if isinstance(answer, Mapped):
         return answer
-    folder = None
-    if RUN_FOLDER.read(staging) is not None:
+    answer, folder = fetched.named(answer), None
+    if (record := RUN_FOLDER.read(staging)) is not None:
+        if fetched.names:
+            # The run is of what was asked for, wherever it was while this was done.
+            RUN_FOLDER.write(staging, {**fetched.named(record), "request": task.request})
         publish(staging, task.place)
         folder = task.place
     if "failed" in answer:

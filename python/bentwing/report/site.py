@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 from bentwing.base.atomic import write_text
+from bentwing.base.run_record import RUN_FOLDER
 from bentwing.report.merging import merging_section
 from bentwing.report.sections import SIGNS
 
@@ -130,8 +131,10 @@ def _places(record: Mapping[str, Any]) -> str:
 
 def _recording(one: Mapping[str, Any], site: Path) -> tuple[str, ...]:
     folder = one["folder"]
-    has_report = folder is not None and (site / folder / "report.html").exists()
-    has_picture = folder is not None and (site / folder / "map_top.png").exists()
+    # Of a site in a store, only the records are here.
+    record = None if folder is None else RUN_FOLDER.read(site / folder)
+    files = (record or {}).get("files", [])
+    has_report, has_picture = "report.html" in files, "map_top.png" in files
     return (
         _picture(folder, one["name"]) if has_picture else "",
         _link(one["name"], folder) if has_report else escape(one["name"]),

@@ -104,4 +104,5 @@ def _is_mapped(
 ) -> bool:
     """Whether a folder holds the complete run of a flight, made in the same way."""
     read = [*paths, *([] if payload_file is None else [Path(payload_file)])]
-    return record_of_request(run, request_of(settings, inputs_of(read)), paths) is not None
+    where = [str(resolved(path)) for path in paths]
+    return record_of_request(run, request_of(settings, inputs_of(read)), where) is not None

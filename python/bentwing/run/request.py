@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 from bentwing.base.errors import BentwingError
 from bentwing.base.plain import plain
 from bentwing.base.provenance import bentwing_version, describe_input, files_of
-from bentwing.base.regular_file import resolved
 from bentwing.base.run_record import finished_record
 
 if TYPE_CHECKING:
@@ -60,13 +59,13 @@ def inputs_of(paths: Iterable[Path]) -> list[dict[str, Any]]:
 
 
 def record_of_request(
-    run: Path, request: str, recordings: Sequence[Path] | None
+    run: Path, request: str, recordings: Sequence[str] | None
 ) -> dict[str, Any] | None:
     """Return the record of the complete run in a folder, None unless it is of this request.
 
     Parameters
     ----------
-    recordings : the files of the recording, which a merging reads again where the run found them; None
+    recordings : where the recording lies, as run.json has it, for a merging reads it again there; None
         for a merged map, which has those of its runs
     """
     try:
@@ -75,5 +74,5 @@ def record_of_request(
         return None
     if record.get("request") != request:
         return None
-    where = None if recordings is None else [str(resolved(path)) for path in recordings]
-    return record if where is None or record.get("recordings") == where else None
+    is_there = recordings is None or record.get("recordings") == list(recordings)
+    return record if is_there else None

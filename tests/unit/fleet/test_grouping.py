@@ -40,7 +40,7 @@ def merge(tmp_path, monkeypatch):
         ]
         found = SimpleNamespace(sources=sources, record={})
         fakes = {
-            "open_sources": lambda folders: folders,
+            "open_sources": lambda folders, _moved: folders,
             "replace": lambda folder, name: next(s for s in sources if s.name == name),  # noqa: ARG005
             "settled": lambda settings, _: settings,
             "budget_of": lambda *_: SimpleNamespace(rate=rate),
@@ -58,7 +58,13 @@ def merge(tmp_path, monkeypatch):
         runs = {source.name: str(source.folder) for source in sources}
         settings = merge_settings(map_spacing=spacing)
         answer = grouping.merge_groups(
-            runs, tmp_path / "groups", settings, dict(made), kept=tmp_path / "kept", progress=None
+            runs,
+            tmp_path / "groups",
+            settings,
+            dict(made),
+            kept=tmp_path / "kept",
+            recordings={},
+            progress=None,
         )
         return [one["folder"] for one in answer["groups"]], list(fresh)
 

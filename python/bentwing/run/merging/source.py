@@ -7,6 +7,7 @@ from collections import Counter
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
@@ -25,7 +26,7 @@ from bentwing.run.mapping import MapSource
 from bentwing.run.run import estimate_of, require_single, verdict_in
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from bentwing.base.estimate import Estimate
     from bentwing.base.progress import Progress
@@ -118,8 +119,14 @@ class Source:
             yield RecordingPart(recording, self.payload, self.start, self.duration)
 
 
-def open_sources(folders: Sequence[Path]) -> list[Source]:
+def open_sources(
+    folders: Sequence[Path], moved: Mapping[Path, list[Path]] = MappingProxyType({})
+) -> list[Source]:
     """Read the runs in folders.
+
+    Parameters
+    ----------
+    moved : where the recordings of some runs are now
 
     Raises
     ------
@@ -141,7 +148,7 @@ def open_sources(folders: Sequence[Path]) -> list[Source]:
             raise UsageError(msg)
         seen[place] = folder
     names = distinct_names([resolved(folder).name for folder in folders])
-    sources = [open_source(f, n) for f, n in zip(folders, names, strict=True)]
+    sources = [open_source(f, n, moved.get(f)) for f, n in zip(folders, names, strict=True)]
     _refuse_same_recording(sources)
     return sources
 
@@ -157,7 +164,7 @@ def distinct_names(names: Sequence[str]) -> list[str]:
     return found
 
 
-def open_source(folder: Path, name: str) -> Source:
+def open_source(folder: Path, name: str, moved: list[Path] | None = None) -> Source:
     """Read the run in a folder; see `open_sources`."""
     record = require_single(folder, finished_record(folder))
     if not record.get("recordings") or record.get("start_ns") is None:
@@ -167,11 +174,11 @@ def open_source(folder: Path, name: str) -> Source:
         )
         raise UsageError(msg)
     with understood(folder):
-        return _source(folder, name, record)
+        return _source(folder, name, record, moved)
 
 
-def _source(folder: Path, name: str, record: dict[str, Any]) -> Source:
-    recordings = [Path(path) for path in record["recordings"]]
+def _source(folder: Path, name: str, record: dict[str, Any], moved: list[Path] | None) -> Source:
+    recordings = moved or [Path(path) for path in record["recordings"]]
     _require_unchanged(folder, recordings, record["inputs"])
     settings = record["settings"]
     return Source(

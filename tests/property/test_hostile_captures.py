@@ -22,7 +22,7 @@ pytest.importorskip("velodyne_decoder", reason='needs pip install "bentwing[pack
 
 START_US = 1_700_000_000 * 10**6
 N = 24  # packets
-ROBOSENSE = ("rs16", "rs32", "helios")
+ROBOSENSE = ("rs16", "rs32", "helios", "airy")
 MODELS = ("vlp16", "vlp16 dual", "ouster", *LIDARS)
 
 

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from bentwing.base.clock import Clock
 from bentwing.base.errors import BentwingError
 from bentwing.recording import LidarBatch, Payload, Recording
+from bentwing.recording.clock_steps import ClockSteps
 from bentwing.recording.lidar_stream import LidarStream
 from bentwing.recording.messages import wire_clouds
 from bentwing.recording.messages.lidar_messages import LIDAR_MESSAGES
@@ -64,7 +65,7 @@ def test_any_field_layout_is_read(ros, table):
 def lidar_stream(kind, *, cdr):
     return LidarStream(
         "/lidar", kind, CLOCK, LidarReading(), cdr=cdr, use_recorder_time=False, times=READING,
-        needs_beam_times=False,
+        needs_beam_times=False, steps=ClockSteps(0, []),
     )  # fmt: skip
 
 
@@ -72,9 +73,10 @@ def streams_and_messages(ros):
     cdr = not ros.ros1
     table = np.zeros(5, [("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("time", "<f4"), ("ring", "u1")])
     table["x"], table["time"] = np.arange(1, 6), np.linspace(0, 0.1, 5)
-    imu = ImuStream("/imu", CLOCK, ImuReading(), cdr=cdr, use_recorder_time=False)
+    read = {"cdr": cdr, "use_recorder_time": False}
+    imu = ImuStream("/imu", CLOCK, ImuReading(), **read, steps=ClockSteps(0, []))
     encoder = EncoderStream(
-        "/encoder", CLOCK, EncoderReading("motor"), cdr=cdr, use_recorder_time=False
+        "/encoder", CLOCK, EncoderReading("motor"), **read, steps=ClockSteps(0, [])
     )
     lidars = [
         ros.cloud(0.25, table),

@@ -122,7 +122,7 @@ def _merged(
         "made": _made(task.place), "kept": task.kept, "recordings": _fetch(task.runs, fetched),
     }  # fmt: skip
     answer = run_unless_done("merge", order, "merge", processes, lambda: finished_merging(task))
-    answer = fetched.named(answer)
+    answer = {name: fetched.named(value) for name, value in answer.items()}
     if "failed" in answer or "request" in answer:
         return answer
     task.place.mkdir(exist_ok=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import csv
 import io
-from pathlib import Path  # noqa: TC003 - pydantic reads the annotations
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import Field, ValidationError, field_validator
@@ -189,7 +189,8 @@ def _require_distinct(path: Path, entries: Sequence[Entry], places: Sequence[str
     """Refuse names and recordings that are there twice."""
     seen: dict[object, str] = {}
     for entry, place in zip(entries, places, strict=True):
-        recording = (tuple(resolved(part) for part in entry.parts), entry.start)
+        files = tuple(resolved(part) for part in entry.parts if isinstance(part, Path))
+        recording = (files, entry.start)
         for key, what in ((entry.name, f"the name {entry.name!r}"), (recording, "the recording")):
             if key in seen:
                 msg = f"{path}, {place}: has {what} of {seen[key]}, too; give each once"

@@ -68,8 +68,10 @@ def _table(rows: Sequence[Mapping[str, Any]], texts: Texts) -> str:
         )
         for row in rows
     ]
-    head = (texts.mark, texts.use, texts.across, texts.before, texts.residual)
-    head = (*head, *([texts.sigma] if has_spheres else []), *([texts.picked] if is_picked else []))
+    head = (
+        texts.mark, texts.use, texts.across, texts.before, texts.residual,
+        *([texts.sigma] if has_spheres else []), *([texts.picked] if is_picked else []),
+    )  # fmt: skip
     return table(head, cells, numbers=frozenset({3, 4, 5, 6}))
 
 

@@ -32,7 +32,8 @@ def test_keys_stand_alone_or_below_project(tmp_path):
         ("{}", "says nothing of a project"),
         ("- a", "says nothing of a project"),
         (f"name: {'x' * 300}", "at most 200 characters"),
-        ('name: "a\\0b"', "control characters"),
+        ('name: "a\\0b"', "has a NUL"),
+        ('name: "a\\x07b"', "control characters"),
     ],
 )
 def test_what_cannot_be_used_is_named(tmp_path, text, part):

@@ -11,6 +11,7 @@ from bentwing.report.loops import closing_table, revisits_table
 from bentwing.report.picture import View
 from bentwing.report.plot import Series, line_plot
 from bentwing.report.stretches import degenerate_spans, spans_sentence
+from bentwing.report.texts import ENGLISH
 from bentwing.report.way import Way, draw_way
 
 
@@ -75,9 +76,9 @@ def windows(flags):
 def test_degenerate_windows_become_stretches():
     spans = degenerate_spans(windows([False, True, True, False, True]))
     assert spans == [(1.0, 3.0), (4.0, 5.0)]
-    assert "for 3 s" in spans_sentence(spans)
-    assert "from 1.0 to 3.0 s" in spans_sentence(spans)
-    assert "all the time" in spans_sentence(degenerate_spans(windows([False])))
+    assert "for 3 s" in spans_sentence(spans, ENGLISH)
+    assert "from 1.0 to 3.0 s" in spans_sentence(spans, ENGLISH)
+    assert "all the time" in spans_sentence(degenerate_spans(windows([False])), ENGLISH)
 
 
 def test_stretches_are_marked_in_a_plot():

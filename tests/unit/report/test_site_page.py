@@ -7,6 +7,7 @@ import re
 
 import pytest
 
+from bentwing.base.run_record import RUN_FOLDER
 from bentwing.report.site import write_site_page
 
 
@@ -23,14 +24,14 @@ def group(*runs, folder="groups/1", state="good"):
 
 @pytest.fixture
 def page(tmp_path):
-    """Write the page of a record beside the files of its runs, and return it."""
+    """Write the page of a record beside the records of its runs, and return it."""
 
     def page(recordings, groups=None, failure=None, places=None):
         for one in recordings:
             if one["folder"]:
                 (tmp_path / one["folder"]).mkdir(parents=True)
-                for name in ("report.html", "map_top.png"):
-                    (tmp_path / one["folder"] / name).touch()
+                run = {"kind": RUN_FOLDER.kind, "files": ["map_top.png", "report.html"]}
+                RUN_FOLDER.write(tmp_path / one["folder"], run)
         record = {"recordings": recordings, "groups": groups, "failure": failure, "places": places}
         write_site_page(tmp_path / "index.html", record)
         return (tmp_path / "index.html").read_text(encoding="utf-8")

@@ -140,7 +140,7 @@ class BlockPackets:
         n_together = n_returns * model.blocks_of_return
         per_firing = blocks["channels"].reshape(n, n_blocks // n_together, n_all, -1)
         ranges, intensities = _strongest(
-            per_firing["distance"] & model.range_bits, per_firing["intensity"]
+            per_firing["distance"] & np.uint16(model.range_bits), per_firing["intensity"]
         )
         rotor = blocks["azimuth"][:, ::n_together].astype(np.float64)
         starts, steps = _firings(rotor, model.block_us)

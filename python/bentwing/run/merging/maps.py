@@ -116,11 +116,11 @@ def _joins(group: Placed, found: Ingredients) -> list[Join]:
     return joins_of((m.a.run, m.b.run) for m in links)
 
 
-def _judged(group: Placed, found: Ingredients, fixed: Collection[str]) -> list[Evidence]:
+def _judged(group: Placed, found: Ingredients, fixed: set[str]) -> list[Evidence]:
     """Judge by what the positions of the runs rest on, where fixes do not say them."""
     names = [source.name for source in found.sources]
     pairs = [(names[one.a], names[one.b]) for one in _joins(group, found) if not one.is_confirmed]
-    return judge_joins([pair for pair in pairs if not fixed.issuperset(pair)])
+    return judge_joins([pair for pair in pairs if not fixed >= {*pair}])
 
 
 def _with_fixes(on_earth: OnEarth) -> set[str]:

@@ -248,10 +248,10 @@ def test_wrong_usage_ends_with_2(bentwing, run_folder, monkeypatch, arguments, s
     ("option", "name", "content", "says"),
     [
         ("--reference-trajectory", "kitti.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n", "as KITTI writes"),
-        ("--reference-trajectory", "missing.txt", None, "not readable"),
+        ("--reference-trajectory", "missing.txt", None, "no such file"),
         ("--reference-map", "scan.xyz", "0 0 0\n", "convert it first"),
         ("--reference-map", "cut.ply", "ply\nformat ascii 1.0\n", "no end"),
-        ("--reference-map", "missing.ply", None, "not readable"),
+        ("--reference-map", "missing.ply", None, "no such file"),
     ],
 )
 def test_a_reference_that_cannot_be_used_ends_with_3(bentwing, run_folder, tmp_path, option, name, content, says):  # fmt: skip

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from bentwing.base.errors import RecordingError
-from bentwing.recording.containers.scanned import ScanEnd, ScannedMessage
+from bentwing.recording.containers.scanned import ScanEnd, ScannedMessage, first_bytes
 from bentwing.recording.messages.livox import CUSTOM_MSG, POINT, custom_message
 
 if TYPE_CHECKING:
@@ -69,12 +69,7 @@ def check_lvx2(path: Path) -> None:
     RecordingError
         With what it is instead, and what to do.
     """
-    try:
-        with path.open("rb") as file:
-            head = file.read(_FILE.size)
-    except OSError as error:
-        msg = f"{path}: cannot be opened ({error.strerror}); check the file's permissions"
-        raise RecordingError(msg) from None
+    head = first_bytes(path, _FILE.size)
     if head[:10] != SIGNATURE or len(head) < _FILE.size:
         msg = (
             f"{path}: not a file of Livox Viewer 2 (it begins with {head[:10].hex() or 'nothing'}, not with "

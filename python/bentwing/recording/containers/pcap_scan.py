@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from bentwing.base.errors import RecordingError
 from bentwing.recording.containers.datagrams import LINKS, DatagramReader, FrameProblemError
-from bentwing.recording.containers.scanned import ScanEnd, ScannedMessage
+from bentwing.recording.containers.scanned import ScanEnd, ScannedMessage, first_bytes
 from bentwing.recording.topics import (
     UDP_HESAI,
     UDP_OUSTER_IMU,
@@ -61,12 +61,7 @@ def check_pcap(path: Path) -> None:
     RecordingError
         With what it is instead, and what to do.
     """
-    try:
-        with path.open("rb") as file:
-            head = file.read(24)
-    except OSError as error:
-        msg = f"{path}: cannot be opened ({error.strerror}); check the file's permissions"
-        raise RecordingError(msg) from None
+    head = first_bytes(path, 24)
     if head[:4] == PCAPNG:
         msg = (
             f"{path}: a capture in the pcapng format, but bentwing reads the older pcap only; "

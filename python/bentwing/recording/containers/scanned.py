@@ -6,6 +6,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
+from bentwing.base.errors import RecordingError
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator
     from pathlib import Path
@@ -35,6 +37,22 @@ class ScanEnd(NamedTuple):
     """Why a scan ended: `problem` is None at the regular end of the file."""
 
     problem: str | None
+
+
+def first_bytes(path: Path, n: int) -> bytes:
+    """Return the first bytes of a file, which tell what it is; fewer of a shorter one.
+
+    Raises
+    ------
+    RecordingError
+        If it cannot be opened.
+    """
+    try:
+        with path.open("rb") as file:
+            return file.read(n)
+    except OSError as error:
+        msg = f"{path}: cannot be opened ({error.strerror}); check the file's permissions"
+        raise RecordingError(msg) from None
 
 
 class ScannedSource:

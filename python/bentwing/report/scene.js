@@ -184,7 +184,7 @@ const startScene = (figure) => {
   let asked = 0;
   const redraw = () => { asked = asked || requestAnimationFrame(() => { asked = 0; draw(); }); };
 
-  const number = (x, digits) => x.toFixed(digits).replace(".", data.decimal);
+  const number = (x, digits) => x.toFixed(digits).replace(".", data.decimal).replace("-", "\u2212");
   const part = (name) => figure.querySelector(`[data-part="${name}"]`);
   const drawScale = () => {
     const longest = canvas.clientWidth / 4 / view.scale, magnitude = 10 ** Math.floor(Math.log10(longest));

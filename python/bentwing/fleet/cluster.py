@@ -5,11 +5,12 @@ from __future__ import annotations
 
 import logging
 import os
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 from bentwing.base.errors import InputError, UsageError
+from bentwing.base.interrupts import postponed
 from bentwing.fleet.memory import available_mb
 from bentwing.fleet.pool import threads_among
 
@@ -156,18 +157,19 @@ def started(
         f"{n} worker{'s' if n > 1 else ''} on this machine, {each / 1e3:.1f} GB each; "
         f"the largest recording takes about {megabytes / 1e3:.1f} GB"
     )
-    with (
-        dask.config.set(_OF_CLUSTER),
-        distributed.LocalCluster(
-            n_workers=n,
-            threads_per_worker=1,
-            memory_limit=0,  # the work is not in the worker but in a process of its own
-            resources={MEMORY: max(each, megabytes)},
-            dashboard_address="127.0.0.1:0",
-            silence_logs=logging.CRITICAL,
-        ) as cluster,
-        distributed.Client(cluster) as client,
-    ):
+    with dask.config.set(_OF_CLUSTER), ExitStack() as stack:
+        with postponed():  # dask cannot close a cluster that is half started
+            cluster = stack.enter_context(
+                distributed.LocalCluster(
+                    n_workers=n,
+                    threads_per_worker=1,
+                    memory_limit=0,  # the work is not in the worker but in a process of its own
+                    resources={MEMORY: max(each, megabytes)},
+                    dashboard_address="127.0.0.1:0",
+                    silence_logs=logging.CRITICAL,
+                )
+            )
+            client = stack.enter_context(distributed.Client(cluster))
         _say(client, progress, "" if find_spec("bokeh") else "; pip install bokeh to see it")
         yield ClusterPool(client, threads, n)
 

@@ -27,6 +27,8 @@ Disturb = Callable[["Popen[bytes]"], None]
 RECORDINGS = ("recording.bag", "recording.mcap")
 MEGABYTE = 2**20
 
+_STARTS = 0.3  # s, in which Python itself starts, before any program can say that it is interrupted
+
 
 @dataclass(frozen=True, slots=True)
 class Healthy:
@@ -281,7 +283,7 @@ def in_time(healthy: Healthy, folder: Path, draw: random.Random) -> Attempt:
     number = draw.choice([signal.SIGKILL, signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
     name = draw.choice(WRITERS)
     undisturbed = usual(name, healthy)
-    after = draw.uniform(0.0, 1.1) * undisturbed.seconds
+    after = _STARTS + draw.uniform(0.0, 1.1) * undisturbed.seconds
     command = whole(name, healthy, folder)
 
     def end(process: Popen[bytes]) -> None:

@@ -9,27 +9,8 @@ use crate::sheet::{Room, Sheet};
 use crate::split::{FEWEST, FLAT, Half, Pair, Sums, cost, gain, line_between, split};
 use crate::spots::{Spot, dot, partition, single};
 
-/// The likeliest step whose line is about this one; its line, and by how much it is likelier than one sheet
-/// (`gain`).
-pub(crate) fn likeliest_step(
-    line: Half,
-    spots: &mut [Spot],
-    radius: f64,
-    normal: &Vector3<f64>,
-    one: &Sheet,
-    room: &mut Room,
-) -> Option<(Half, f64)> {
-    let first = planes_beside(line, spots, radius, normal, room)?;
-    let line = line_between(spots, radius, &first, normal, room);
-    let second = line.and_then(|line| planes_beside(line, spots, radius, normal, room));
-    let pair = match second {
-        Some(second) if cost(&second) < cost(&first) => second,
-        _ => first,
-    };
-    Some((pair[0].1, gain(&pair, one)))
-}
-
-/// The line of a step about a given one that is likelier than one sheet, and than two of any kind.
+/// The line of the likeliest step about a given one, where it is likelier than one sheet and than two of any
+/// kind.
 pub(crate) fn certain_step(
     line: Half,
     spots: &mut [Spot],
@@ -38,11 +19,18 @@ pub(crate) fn certain_step(
     room: &mut Room,
 ) -> Option<Half> {
     let one = Sheet::fit(spots, radius, normal, room)?;
-    let (line, gained) = likeliest_step(line, spots, radius, normal, &one, room)?;
+    let first = planes_beside(line, spots, radius, normal, room)?;
+    let line = line_between(spots, radius, &first, normal, room);
+    let second = line.and_then(|line| planes_beside(line, spots, radius, normal, room));
+    let pair = match second {
+        Some(second) if cost(&second) < cost(&first) => second,
+        _ => first,
+    };
+    let gained = gain(&pair, &one);
     let is_step = gained > 0.0
         && split(spots, radius, normal, Some(&one), room)
             .is_none_or(|free| gain(&free, &one) < gained);
-    is_step.then_some(line)
+    is_step.then_some(pair[0].1)
 }
 
 /// Two planes with one normal, each on its side of a line.

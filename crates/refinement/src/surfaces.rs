@@ -12,10 +12,9 @@ use crate::noise::Noise;
 use crate::piece::Piece;
 use crate::sample::Sorted;
 use crate::sheet::{Room, Sheet};
-use crate::split::{Half, split};
+use crate::split::{Half, Pair, split};
 use crate::spots::{Spot, dot, normal_of, partition, single};
-use crate::step::planes_beside;
-use crate::steps::{CHUNK, Steps};
+use crate::steps::{CHUNK, Near, Steps};
 
 /// Fewer points of one side are no sheet.
 const FEWEST_SPOTS: usize = 8;
@@ -89,7 +88,9 @@ pub(crate) fn layers_of(sorted: &Sorted, noise: &Noise) -> Vec<Layer> {
     let of_level = |(number, level): (usize, &Level)| {
         let cells = open_cells(level, &open);
         let wider = sorted.levels.get(number + 1);
-        let steps = wider.map(|wider| Steps::of(sorted, wider, &open_cells(wider, &open), noise));
+        let asking = cells_with(level, &cells, sorted.settings.enough);
+        let steps =
+            wider.map(|wider| Steps::of(sorted, wider, &above(wider, level, &asking), noise));
         let found: Vec<Vec<Found>> = cells
             .par_chunks(CHUNK)
             .map_init(<[Bench; 2]>::default, |[bench, of_step], places| {
@@ -98,8 +99,9 @@ pub(crate) fn layers_of(sorted: &Sorted, noise: &Noise) -> Vec<Layer> {
                     let (number, around) = (level.in_rows(place), around.of(place));
                     let here = Surroundings::of(sorted, level, number, &around);
                     let point = level.points(number).start;
-                    let mut line = || steps.as_ref()?.near(&here, point, noise, of_step);
-                    let pieces = pieces_of(&here, &mut line, noise, bench);
+                    let near = steps.as_ref().and_then(|steps| steps.near(&here, point));
+                    let pieces =
+                        pieces_of(&here, near.as_ref(), noise, [&mut *bench, &mut *of_step]);
                     let beside = beside(&around);
                     (!pieces.is_empty()).then_some(Found {
                         number,
@@ -122,6 +124,35 @@ pub(crate) fn layers_of(sorted: &Sorted, noise: &Noise) -> Vec<Layer> {
 fn open_cells(level: &Level, open: &[bool]) -> Vec<usize> {
     let is_open = |&place: &usize| level.points(level.in_rows(place)).any(|i| open[i]);
     (0..level.n_cells()).filter(is_open).collect()
+}
+
+/// Of cells by their places among the rows, the numbers of those with so many points in them and around.
+fn cells_with(level: &Level, places: &[usize], enough: usize) -> Vec<u32> {
+    let found: Vec<Vec<u32>> = places
+        .par_chunks(CHUNK)
+        .map(|places| {
+            let mut around = level.around(places[0]);
+            let mut has_enough = |&place: &usize| {
+                let near = around.of(place);
+                let numbers = near.iter().filter(|&&number| number != NONE);
+                numbers.map(|&n| level.points(n).len()).sum::<usize>() >= enough
+            };
+            let chosen = places.iter().filter(|place| has_enough(place));
+            chosen.map(|&place| level.in_rows(place)).collect()
+        })
+        .collect();
+    found.into_iter().flatten().collect()
+}
+
+/// The places among the rows of the larger cells in which some smaller ones are.
+fn above(larger: &Level, smaller: &Level, numbers: &[u32]) -> Vec<usize> {
+    let mut is_asked = vec![false; larger.n_cells()];
+    for &number in numbers {
+        is_asked[larger.cell_of(smaller.points(number).start) as usize] = true;
+    }
+    (0..larger.n_cells())
+        .filter(|&place| is_asked[larger.in_rows(place) as usize])
+        .collect()
 }
 
 /// Whether each point is in or beside one of the largest cells that have a point to be refined: no other
@@ -186,13 +217,16 @@ fn residual(sorted: &Sorted, level: &Level, place: usize, bench: &mut Bench) -> 
 
 fn pieces_of(
     here: &Surroundings,
-    line: &mut dyn FnMut() -> Option<Half>,
+    near: Option<&Near>,
     noise: &Noise,
-    bench: &mut Bench,
+    [bench, of_step]: [&mut Bench; 2],
 ) -> Vec<Piece> {
     let (settings, radius) = (&here.sorted.settings, here.radius());
     let Some((spots, room)) = here.spots(Some(noise), bench) else {
         return Vec::new();
+    };
+    let mut step = |spots: &mut [Spot], normal: &Vector3<f64>, one: &Sheet, room: &mut Room| {
+        near?.planes(spots, normal, one, room, of_step)
     };
     let (n, Some(normal)) = (spots.len(), normal_of(spots)) else {
         return Vec::new();
@@ -207,7 +241,7 @@ fn pieces_of(
         } else {
             normal_of(side)
         };
-        let sheets = own.map_or(Vec::new(), |n| sheets_of(side, radius, &n, line, room));
+        let sheets = own.map_or(Vec::new(), |n| sheets_of(side, radius, &n, &mut step, room));
         for (sheet, half) in sheets {
             if sheet.n_passes >= settings.fewest_passes && sheet.n_points >= FEWEST_SPOTS as f64 {
                 pieces.push(Piece::of(here.middle, &sheet, half.as_ref()));
@@ -217,12 +251,15 @@ fn pieces_of(
     pieces
 }
 
-/// One sheet, or two where that is more likely or where the line of a step is known; `normal` is a guess.
+/// Finds the planes of a step through spots with this normal that one sheet explains.
+type Step<'a> = dyn FnMut(&mut [Spot], &Vector3<f64>, &Sheet, &mut Room) -> Option<Pair> + 'a;
+
+/// One sheet, or two where that is more likely or where there is a step; `normal` is a guess.
 fn sheets_of(
     spots: &mut [Spot],
     radius: f64,
     normal: &Vector3<f64>,
-    line: &mut dyn FnMut() -> Option<Half>,
+    step: &mut Step,
     room: &mut Room,
 ) -> Vec<(Sheet, Option<Half>)> {
     let one = Sheet::fit(spots, radius, normal, room);
@@ -230,8 +267,10 @@ fn sheets_of(
     if one.as_ref().is_none_or(|one| one.excess() > SUSPICIOUS) {
         pair = split(spots, radius, normal, one.as_ref(), room);
     }
-    if pair.is_none() && one.is_some() {
-        pair = line().and_then(|line| planes_beside(line, spots, radius, normal, room));
+    if pair.is_none()
+        && let Some(one) = &one
+    {
+        pair = step(spots, normal, one, room);
     }
     if let Some(pair) = pair {
         return pair.map(|(sheet, half)| (sheet, Some(half))).to_vec();
